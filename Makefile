@@ -1,0 +1,30 @@
+# RUN= (empty) runs a target in the current environment, as the image does.
+RUN ?= ./run
+OUT ?= results
+SCENE ?= vertical-c1-cd4
+ARGS ?=
+IMAGE ?= drillfem
+
+.PHONY: demo test lint verify image
+
+demo: ## the main job: a 1200 m string drills rock; numbers, pictures and a table in $(OUT)/$(SCENE)
+	$(RUN) drillfem run $(SCENE) --out $(OUT)/$(SCENE)
+	$(RUN) drillfem render $(OUT)/$(SCENE)
+
+test: ## the fast tests; ARGS="-k bit -x" goes to pytest
+	$(RUN) pytest $(ARGS)
+
+lint:
+	$(RUN) ruff check
+	$(RUN) ruff format --check
+	$(RUN) mypy
+
+verify: ## the long tests and the benchmarks (hours)
+	$(RUN) pytest -m "verify or slow" $(ARGS)
+	for bench in benchmarks/*.py; do $(RUN) python3 $$bench || exit 1; done
+
+# CERT=FILE hands the host's certificates to pip, where the network needs them.
+image: ## with docker, podman or buildah
+	@builder=$$(command -v docker || command -v podman || command -v buildah) || \
+	    { echo "make image needs docker, podman or buildah" >&2; exit 1; }; \
+	$$builder build -t $(IMAGE) $(if $(CERT),--build-arg PIP_CERT=/host-ca.crt -v $(CERT):/host-ca.crt:ro) .

@@ -1,0 +1,354 @@
+"""The command line. Each command imports what it needs: ``drillfem list`` works without DOLFINx.
+
+Exit codes: 0 done, 1 the simulation failed (what was computed is kept), 2 bad input, 130 interrupted. Errors
+are one line on stderr; DRILLFEM_DEBUG=1 shows the traceback instead.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+import shlex
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Self
+
+import typer
+from rich.console import Console
+
+from drillfem.errors import DrillfemError, MissingDependency, SceneError, SimulationError
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from drillfem.results import Result
+
+PLAIN_INTERVAL = 10.0
+"""Seconds of wall time between two progress lines where there is no terminal."""
+
+app = typer.Typer(
+    name="drillfem",
+    help="Drill-string dynamics: a Cosserat rod drills rock.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+stderr = Console(stderr=True, highlight=False)
+
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Result folder.")]
+SceneName = Annotated[
+    str, typer.Argument(metavar="SCENE", help="A built-in scene (drillfem list) or a TOML file.")
+]
+Until = Annotated[str | None, typer.Option(metavar="SECONDS", help="Stop at this simulated time.")]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line with ``arguments`` (those of the process by default) and return the exit code."""
+    _log_to(stderr)
+    command = typer.main.get_command(app)
+    try:
+        return int(command.main(args=arguments, prog_name="drillfem", standalone_mode=False) or 0)
+    except Exception as error:
+        if os.environ.get("DRILLFEM_DEBUG"):
+            raise
+        message, code = _explain(error)
+    except KeyboardInterrupt:
+        message, code = "interrupted", 130
+    stderr.print(message, markup=False, soft_wrap=True)
+    return code
+
+
+@app.callback(invoke_without_command=True)
+def _start(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    if version:
+        print(f"drillfem {_version()}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        print(context.get_help())
+        raise typer.Exit
+
+
+@app.command("list")
+def list_scenes() -> None:
+    """List the built-in scenes."""
+    from drillfem.scene import builtin_scenes
+
+    scenes = builtin_scenes()
+    width = max(map(len, scenes), default=0)
+    for name, title in scenes.items():
+        print(f"{name:{width}}  {title}".rstrip())
+
+
+@app.command()
+def info(
+    scene: SceneName,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key.")
+    ] = None,
+) -> None:
+    """Say what a scene simulates."""
+    from drillfem.scene import describe, load_scene
+
+    rows = describe(load_scene(scene, _overrides(set_)))
+    width = max(len(label) for label, _ in rows)
+    for label, text in rows:
+        print(f"{label:{width}}  {text}")
+
+
+@app.command()
+def run(
+    scene: SceneName,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="New folder for the result.")],
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the scene: bit.blades=5."),
+    ] = None,
+    until: Until = None,
+    certify: Annotated[
+        bool,
+        typer.Option("--certify", help="Repeat with half the step, a finer mesh, nearby starts; compare."),
+    ] = False,
+) -> None:
+    """Simulate a scene."""
+    from drillfem.results import check_new_folder
+    from drillfem.scene import load_scene
+
+    end = _seconds(until)
+    loaded = load_scene(scene, _overrides(set_))
+    check_new_folder(out)
+    import drillfem
+
+    with _keeping(out):
+        with ProgressDisplay() as progress:
+            result = drillfem.simulate(loaded, out=out, progress=progress, until=end)
+        companions = None
+        if certify:
+            from drillfem.solve import certify as repeat
+
+            companions = repeat(loaded, end)
+        _report(result, companions)
+
+
+@app.command()
+def resume(folder: Folder, until: Until = None) -> None:
+    """Continue a result as if it had never stopped."""
+    from drillfem.results import open_result
+
+    end = _seconds(until)
+    open_result(folder)
+    import drillfem
+
+    with _keeping(folder):
+        with ProgressDisplay() as progress:
+            result = drillfem.resume(folder, progress=progress, until=end)
+        _report(result)
+
+
+@app.command()
+def render(
+    folder: Folder,
+    time: Annotated[
+        str | None, typer.Option(metavar="SECONDS", help="Which moment; the last by default.")
+    ] = None,
+    field: Annotated[str | None, typer.Option(metavar="NAME", help="What colours the string.")] = None,
+    film: Annotated[bool, typer.Option("--film", help="Make a film too.")] = False,
+) -> None:
+    """Make pictures of a result."""
+    at = _seconds(time, "--time")
+    from drillfem.results import is_result, open_result
+
+    if not is_result(folder):
+        open_result(folder)  # says what is wrong with it
+    from drillfem.render import render_all
+
+    for path in render_all(folder, time=at, field=field, film=film):
+        print(path)
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the result.")] = Path("drillfem-demo"),
+) -> None:
+    """Drill with a 1200 m string: history, pictures, and a table."""
+    from drillfem.demo import main as run_demo
+
+    with _keeping(out):
+        run_demo(out)
+
+
+@app.command("warm-up")
+def warm_up() -> None:
+    """Compile all forms and kernels now, so that the first run starts at once."""
+    from drillfem.solve import warm_up as compile_all
+
+    start = time.perf_counter()
+    compile_all()
+    print(f"compiled in {time.perf_counter() - start:.0f} s")
+
+
+class ProgressDisplay:
+    """Progress of a run, to be called with (simulated time in s, its end in s, simulated seconds per second).
+
+    A bar on a terminal; elsewhere a line every ten seconds at most.
+    """
+
+    def __init__(self, console: Console | None = None) -> None:
+        self._console = console or stderr
+        self._bar: Progress | None = None
+        self._task: Any = None
+        self._shown = time.perf_counter()
+
+    def __enter__(self) -> Self:
+        if self._console.is_terminal:
+            from rich.progress import BarColumn, Progress, TextColumn
+
+            text = TextColumn("{task.fields[text]}", markup=False)
+            self._bar = Progress(BarColumn(), text, console=self._console, transient=True)
+            self._task = self._bar.add_task("", total=1.0, text="", visible=False)
+            self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def __call__(self, t: float, end: float, speed: float) -> None:
+        """Show that the run is at ``t`` of ``end`` (s), at ``speed`` simulated seconds per second."""
+        now = time.perf_counter()
+        if now - self._shown < (PLAIN_INTERVAL if self._bar is None else 0.1):
+            return
+        self._shown = now
+        share = t / end if end > 0 else 0.0
+        left = f", {_clock((end - t) / speed)} left" if speed > 0 else ""
+        text = f"{t:.2f} of {end:g} s, {100 * share:.0f} %, {speed:.3g} simulated s per s{left}"
+        if self._bar is not None:
+            self._bar.update(self._task, completed=share, text=text, visible=True)
+        else:
+            self._console.print(text, soft_wrap=True)
+
+
+class _StoppedError(Exception):
+    """A run ended early: the line to print, and the exit code."""
+
+    def __init__(self, message: str, code: int) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+@contextmanager
+def _keeping(folder: Path) -> Iterator[None]:
+    """Say what is in the ``folder`` of a run that is interrupted (by SIGTERM too) or fails."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        where = shlex.quote(str(folder))
+        if not (folder / "history.nc").exists():
+            raise _StoppedError("interrupted before anything was computed", 130) from error
+        how = f"continue with: drillfem resume {where}"
+        if not (folder / "checkpoint").exists():
+            how = "it stopped before its first checkpoint, so it cannot be resumed"
+        raise _StoppedError(f"interrupted: {where} is a valid result up to here; {how}", 130) from error
+    except SimulationError as error:
+        kept = f"; what was computed is kept in {folder}" if (folder / "history.nc").exists() else ""
+        raise _StoppedError(f"error: {_line(error)}{kept}", 1) from error
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _report(result: Result, companions: dict[str, Result] | None = None) -> None:
+    """Print the table of a run, keep its numbers in the folder, and say how to go on."""
+    from drillfem.results import print_summary, store_statistics
+
+    print_summary(result, companions)
+    store_statistics(result, companions)
+    print(f"pictures: drillfem render {shlex.quote(str(result.folder))}")
+
+
+def _explain(error: Exception) -> tuple[str, int]:
+    """One line and an exit code for any exception."""
+    if isinstance(error, _StoppedError):
+        return str(error), error.code
+    if isinstance(error, typer.Abort):
+        return "interrupted", 130
+    if hasattr(error, "format_message"):  # a usage error of click, in whichever package it lives
+        return f"error: {_line(error.format_message())}", 2
+    if isinstance(error, SceneError):
+        return f"error: {_line(error)}", 2
+    if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("drillfem"):
+        error = MissingDependency(f"{error.name} is needed for this and is not installed")
+    if isinstance(error, DrillfemError | OSError):
+        return f"error: {_line(error)}", 1
+    return (
+        f"error: {type(error).__name__}: {_line(error)} (a fault of drillfem; DRILLFEM_DEBUG=1 shows where)",
+        1,
+    )
+
+
+def _line(text: object) -> str:
+    return " ".join(str(text).split())
+
+
+def _overrides(settings: list[str] | None) -> dict[str, str]:
+    pairs = {}
+    for setting in settings or []:
+        key, equals, value = setting.partition("=")
+        if not equals or not key.strip():
+            raise SceneError(f"--set {setting!r}: must be KEY=VALUE, as in bit.blades=5")
+        pairs[key.strip()] = value.strip()
+    return pairs
+
+
+def _seconds(text: str | None, option: str = "--until") -> float | None:
+    """A time such as ``20``, ``20 s``, ``1.5 min``, in seconds."""
+    if text is None:
+        return None
+    units = {"": 1.0, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
+    match = re.fullmatch(r"\s*([\d.]+(?:[eE][+-]?\d+)?)\s*([a-z]*)\s*", text)
+    try:
+        if match and match[2] in units:
+            return float(match[1]) * units[match[2]]
+    except ValueError:
+        pass
+    raise SceneError(f"{option} {text!r}: must be a time, not negative, such as 20 or '1.5 min'")
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+def _version() -> str:
+    import drillfem
+
+    return getattr(drillfem, "__version__", "0")
+
+
+def _log_to(console: Console) -> None:
+    """Show what the package logs, on the first MPI rank only."""
+
+    class Handler(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            console.print(self.format(record), markup=False, soft_wrap=True)
+
+    logger = logging.getLogger("drillfem")
+    rank = os.environ.get("OMPI_COMM_WORLD_RANK") or os.environ.get("PMI_RANK") or "0"
+    logger.handlers = [Handler()] if rank == "0" else [logging.NullHandler()]
+    logger.setLevel(logging.DEBUG if os.environ.get("DRILLFEM_DEBUG") else logging.INFO)
+    logger.propagate = False
+
+
+if __name__ == "__main__":
+    sys.exit(main())

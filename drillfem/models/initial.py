@@ -1,0 +1,92 @@
+"""Where a run starts: the reference rod, or the nominal drilling state with a perturbed spin (spec 9.2, 9.3)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..compat import Array
+from ..forms.ansatz import Spatial
+from ..forms.constitutive import SECTION
+from ..scene import Scene
+from .rod import Rod, section_table
+
+
+def stretch_and_twist(scene: Scene, s: Array) -> tuple[Array, Array]:
+    """Displacement f(s) (m) and twist psi(s) (rad) of the nominal steady state, from the top down.
+
+    f' = N/EA with N(s) = H_0 - weight above s (6-2), psi' = -T_0/GJ: exact for any number of uniform sections.
+    """
+    nominal = scene.nominal()
+    table = section_table(scene)
+    axial, torsion, mass = (table[:, SECTION.index(k)] for k in ("axial", "torsion", "mass"))
+    f, psi = np.zeros_like(s), np.zeros_like(s)
+    start, tension, f0, psi0 = 0.0, nominal.hook_load, 0.0, 0.0
+    for i, section in enumerate(scene.string):
+        end = start + section.length
+        inside = np.clip(s - start, 0.0, section.length)
+        here = (s >= start) if start > 0 else np.ones(len(s), dtype=bool)
+        weight = mass[i] * scene.gravity.magnitude
+        f[here] = f0 + (tension * inside[here] - weight * inside[here] ** 2 / 2) / axial[i]
+        psi[here] = psi0 - nominal.torque_on_bit * inside[here] / torsion[i]
+        f0 += (tension * section.length - weight * section.length**2 / 2) / axial[i]
+        psi0 -= nominal.torque_on_bit * section.length / torsion[i]
+        tension -= weight * section.length
+        start = end
+    return f, psi
+
+
+def spin_perturbation(scene: Scene) -> float:
+    """Extra spin of the bit at the start (rad/s); ``initial.seed_perturbation`` draws a nearby start."""
+    initial = scene.initial
+    nearby = 1.0 + initial.seed_perturbation * np.random.default_rng(initial.seed).standard_normal()
+    return float(initial.spin_perturbation * (scene.top_drive.speed or 0.0) * nearby)
+
+
+def initial_state(rod: Rod) -> Array:
+    """Vector of unknowns at the start, shape (dofs,)."""
+    scene, a, s = rod.scene, rod.ansatz, rod.arc_length
+    state = {name: np.zeros(len(s)) for name in a.x_names + a.v_names}
+    state |= {"r1": np.zeros(len(s)), "r2": np.zeros(len(s)), "r3": s.copy()}
+    bend = np.zeros(len(s))  # rotation about the axis that turns e3 into the bend
+    reference = scene.reference
+    b = np.asarray(reference.bend_towards)
+    if reference.shape == "arc":
+        bend = s / reference.radius
+        offset = reference.radius * (1 - np.cos(bend))
+        state["r1"], state["r2"] = offset * b[0], offset * b[1]
+        state["r3"] = reference.radius * np.sin(bend)
+    turn = np.zeros(len(s))
+    if rod.has_bit:
+        nominal = scene.nominal()
+        f, psi = stretch_and_twist(scene, s)
+        state["r3"] = s + f
+        if scene.initial.state != "literal":
+            turn = psi
+        if scene.initial.state != "rest":
+            state["v3"][:] = nominal.rate_of_penetration
+            state["w3"] = (scene.top_drive.speed or 0.0) + spin_perturbation(scene) * s / rod.length
+    if scene.initial.state == "given":
+        # a rigid motion of the unstressed string: v = v_0 + w x r, and w in the axes of the sections
+        w = np.asarray(scene.initial.angular_velocity)
+        r = np.stack([state[k] for k in ("r1", "r2", "r3")], axis=1)
+        v = np.asarray(scene.initial.velocity) + np.cross(w, r)
+        along = w @ b * np.ones(len(s))
+        across = w @ np.cross((0.0, 0.0, 1.0), b) * np.ones(len(s))
+        towards = np.cos(bend) * along - np.sin(bend) * w[2]
+        w_m = np.outer(towards, b) + np.outer(across, np.cross((0.0, 0.0, 1.0), b))
+        w_m[:, 2] = np.sin(bend) * along + np.cos(bend) * w[2]
+        state |= {f"v{k + 1}": v[:, k] for k in range(3)} | {f"w{k + 1}": w_m[:, k] for k in range(3)}
+    state["phi"] = turn
+    state["theta"] = bend
+    if isinstance(a, Spatial):
+        axis = np.cross((0.0, 0.0, 1.0), b)
+        c, d = np.cos(bend / 2), np.sin(bend / 2)
+        ct, st = np.cos(turn / 2), np.sin(turn / 2)
+        # bend after turn about the material d3: q = q_bend q_turn
+        state["q_a"], state["q_d"] = c * ct, c * st
+        state["q_b"] = d * (axis[0] * ct + axis[1] * st)
+        state["q_c"] = d * (axis[1] * ct - axis[0] * st)
+    u = np.empty((len(s), a.size))
+    for i, name in enumerate(a.x_names + a.v_names):
+        u[rod.nodes, i] = state[name]
+    return u.reshape(-1)

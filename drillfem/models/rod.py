@@ -1,0 +1,433 @@
+"""The semi-discrete rod F(t, u, u-dot) = 0 of a scene, for every ansatz of the one weak form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import dolfinx
+import numpy as np
+import ufl
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ..compat import (
+    Array,
+    MatrixForm,
+    ScalarForm,
+    VectorForm,
+    compile_expression,
+    discontinuous,
+    lagrange,
+    reference_nodes,
+)
+from ..forms import virtual_work as vw
+from ..forms.ansatz import Ansatz, Spatial, ansatz
+from ..forms.constitutive import SECTION, Section, elastic_resultants, viscous_resultants
+from ..meshes.string import BOTTOM, TOP, StringMesh, string_mesh
+from ..scene import Scene
+
+#: Velocity components that an end condition holds; the spin of a driven top is imposed by the drive instead.
+_HELD = {
+    "free": (),
+    "pinned": ("v1", "v2", "v3"),
+    "clamped": ("v1", "v2", "v3", "w1", "w2", "w3"),
+    "hung": ("v1", "v2", "v3", "w1", "w2"),
+    "guided": ("v1", "v2"),
+    "bit": ("v1", "v2", "w1", "w2"),
+}
+
+
+def section_table(scene: Scene) -> Array:
+    """Properties of every section, shape (sections, len(SECTION)), SI."""
+    rows = []
+    for section in scene.string:
+        k = section.section_stiffness()
+        rows.append(
+            [
+                k.shear1,
+                k.shear2,
+                k.axial,
+                k.bending1,
+                k.bending2,
+                k.torsion,
+                section.mass_per_length,
+                section.rotary_inertia,
+                section.rotary_inertia,
+                section.retardation_time,
+                (section.outer_diameter or 0.0) / 2,
+            ]
+        )
+    return np.array(rows)
+
+
+def section_field(scene: Scene, mesh: StringMesh) -> dolfinx.fem.Function:
+    """Piecewise constant field of the section properties, components ordered as SECTION."""
+    V = discontinuous(mesh.mesh, 0, len(SECTION))
+    field = dolfinx.fem.Function(V)
+    table = section_table(scene)
+    values = field.x.array.reshape(-1, len(SECTION))
+    values[V.dofmap.list[mesh.cells.indices, 0]] = table[mesh.cells.values]
+    return field
+
+
+def measures(mesh: StringMesh, degree: int, reduced: bool = True) -> vw.Measures:
+    """Integration rules for fields of this degree.
+
+    Internal work: ``degree`` Gauss points, exact for the products of strains that can be exact without locking
+    (fully integrated P1 is 1458 times too stiff in bending on 12.5 m of drill pipe). Kinematics: Gauss-Lobatto points,
+    which are the nodes of the element, so that r-dot = v holds at every node.
+    """
+    dx = ufl.Measure("dx", mesh.mesh)
+    ds = ufl.Measure("ds", mesh.mesh, subdomain_data=mesh.ends)
+    full = dx(metadata={"quadrature_degree": 2 * degree})
+    internal = dx(metadata={"quadrature_degree": 2 * degree - 1}) if reduced else full
+    nodal = dx(metadata={"quadrature_rule": "GLL", "quadrature_degree": 2 * degree - 1})
+    return vw.Measures(internal, full, nodal, full, ds(TOP), ds(BOTTOM))
+
+
+@dataclass(frozen=True)
+class BitDofs:
+    """Where the bit's motion stands in the vector of unknowns."""
+
+    depth: int
+    speed: int
+    spin: int
+    rotation: slice | int  # quaternion (4 entries) or angle
+
+
+class Rod:
+    """A scene's rod: fields, named terms, residual and Jacobian of F(t, u, u-dot) = 0 on one process.
+
+    Unknowns ``u`` have one block of ``ansatz.size`` entries per node; ``nodes`` lists the nodes from the top down.
+    ``weight`` and ``torque`` (the rock's load on the bit) are set by whoever solves: the law is not part of the form.
+    """
+
+    def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_SELF) -> None:
+        if comm.size > 1:
+            raise ValueError("a rod lives on one process: give it COMM_SELF (ensembles run one string per process)")
+        self.scene = scene
+        self.literal = scene.reading == "literal"
+        self.model = scene.resolved_model()[0]
+        self.ansatz: Ansatz = ansatz(self.model, literal=self.literal)
+        self.string = string_mesh(comm, [s.length for s in scene.string], scene.mesh.elements, scene.mesh.grading)
+        self.mesh = self.string.mesh
+        self.V = lagrange(self.mesh, scene.mesh.degree, self.ansatz.size)
+        self.u, self.u_dot = dolfinx.fem.Function(self.V), dolfinx.fem.Function(self.V)
+        self._u, self._u_dot = self.u.x.array, self.u_dot.x.array
+        s = self.V.tabulate_dof_coordinates()[:, 0]
+        self.nodes = np.argsort(s)
+        self.arc_length: Array = s[self.nodes]
+        self.length = float(sum(section.length for section in scene.string))
+        self.on = measures(self.string, scene.mesh.degree, scene.mesh.quadrature == "reduced")
+        self.section = Section(section_field(scene, self.string))
+        self.s = ufl.SpatialCoordinate(self.mesh)[0]
+        self.weight, self.torque = self.constant(0.0), self.constant(0.0)
+        #: load of the rock on the bit: weight (N), torque (N m); change it by :meth:`set_bit_load`
+        self.bit_load: Array = np.zeros(2)
+        self.tip_force = self.constant(scene.ends.tip_force)
+        self.tip_moment = self.constant(scene.ends.tip_moment)
+        self.shift = self.constant(1.0)
+        self.loads = self._loads()
+        self.terms = vw.dynamic_terms(
+            self.ansatz,
+            self.u,
+            self.u_dot,
+            ufl.TestFunction(self.V),
+            self.s,
+            self.section,
+            self.loads,
+            self.on,
+            self.literal,
+        )
+        self.held, self.driven = self._conditions()
+        self._constrained = np.array(sorted([*self.held, *self.driven]), dtype=np.int32)
+        #: raw residual at the constrained dofs: the reactions of the last evaluation
+        self.reaction: Array = np.zeros(len(self._constrained))
+
+    # -- what acts ---------------------------------------------------------------------------------------------------
+
+    def constant(self, value: Any) -> dolfinx.fem.Constant:
+        """A coefficient that can be changed without compiling again."""
+        return dolfinx.fem.Constant(self.mesh, np.asarray(value, dtype=np.float64))
+
+    def _loads(self) -> vw.Loads:
+        scene, ends, c = self.scene, self.scene.ends, self.constant
+        hook_load = scene.nominal().hook_load if scene.bit is not None and scene.bit.kind == "cutting" else 0.0
+        wall = None
+        if scene.contact is not None and scene.hole.diameter and self.model in ("spatial", "planar"):
+            k = scene.contact
+            wall = vw.Wall(
+                c(scene.hole.diameter / 2),
+                c(k.stiffness),
+                c(k.friction_static),
+                c(k.friction_dynamic),
+                c(k.friction_velocity_scale),
+                c(k.friction_regularisation),
+                projected=k.projected and not self.literal,
+            )
+        return vw.Loads(
+            g=c(np.asarray(scene.gravity.direction) * scene.gravity.magnitude),
+            u0=c(self._stress_free_curvature()),
+            top=vw.EndLoad(c((0.0, 0.0, -hook_load)), c((0.0, 0.0, 0.0)), c(ends.top_mass), c(ends.top_inertia)),
+            bottom=vw.EndLoad(self.tip_force, self.tip_moment, c(ends.bottom_mass), c(ends.bottom_inertia)),
+            bit=(c((0.0, 0.0, 1.0)), self.weight, self.torque) if self.has_bit else None,
+            wall=wall,
+        )
+
+    @property
+    def has_bit(self) -> bool:
+        """Whether rock loads the lower end."""
+        return self.scene.bit is not None and self.scene.bit.kind == "cutting"
+
+    def _stress_free_curvature(self) -> tuple[float, float, float]:
+        reference = self.scene.reference
+        if reference.shape == "straight":
+            return (0.0, 0.0, 0.0)
+        # the axis about which e3 turns towards the bend is e3 x b
+        b = np.asarray(reference.bend_towards)
+        axis = np.cross((0.0, 0.0, 1.0), b) / reference.radius
+        return (float(axis[0]), float(axis[1]), float(axis[2]))
+
+    # -- end conditions ----------------------------------------------------------------------------------------------
+
+    def dof(self, node: int, name: str) -> int:
+        """Index of a named component at a node (0 = top, -1 = bottom)."""
+        return int(self.nodes[node]) * self.ansatz.size + self.ansatz.index(name)
+
+    def _conditions(self) -> tuple[list[int], dict[int, float]]:
+        """Dofs held at zero speed, and driven ones with their share of the drive's speed (component of its axis)."""
+        ends, names = self.scene.ends, self.ansatz.v_names
+        held: list[int] = []
+        driven: dict[int, float] = {}
+        for node, kind in ((0, ends.top), (-1, ends.bottom)):
+            if kind == "driven":
+                # about a fixed axis that is also a material one, R(0) = 1 at the top
+                turning = {f"w{k + 1}": x for k, x in enumerate(self.scene.top_drive.axis) if x != 0.0}
+                driven |= {self.dof(node, n): x for n, x in turning.items() if n in names}
+                fixed = ["v1", "v2", "w1", "w2", "w3"] + ([] if self.has_bit else ["v3"])
+                held += [self.dof(node, n) for n in fixed if n in names and n not in turning]
+            else:
+                held += [self.dof(node, n) for n in _HELD[kind] if n in names]
+        return held, driven
+
+    @cached_property
+    def bit(self) -> BitDofs:
+        """Where the bit's motion stands in u (drilling ansätze)."""
+        if "q_a" in self.ansatz.x_names:
+            first = self.dof(-1, "q_a")
+            rotation: slice | int = slice(first, first + 4)
+        else:
+            rotation = self.dof(-1, "phi")
+        return BitDofs(self.dof(-1, "r3"), self.dof(-1, "v3"), self.dof(-1, "w3"), rotation)
+
+    # -- residual and Jacobian -----------------------------------------------------------------------------------------
+
+    @cached_property
+    def _residual(self) -> VectorForm:
+        return VectorForm(vw.total(self.terms))
+
+    @cached_property
+    def _jacobian(self) -> MatrixForm:
+        F, trial = vw.total(self.terms), ufl.TrialFunction(self.V)
+        return MatrixForm(ufl.derivative(F, self.u, trial) + self.shift * ufl.derivative(F, self.u_dot, trial))
+
+    def create_matrix(self) -> PETSc.Mat:
+        """Matrix for :meth:`jacobian`."""
+        return self._jacobian.create()
+
+    def set_state(self, u: Array, u_dot: Array) -> None:
+        """Copy a state into the coefficients of the forms."""
+        self._u[:] = u
+        self._u_dot[:] = u_dot
+
+    def set_bit_load(self, weight: float, torque: float) -> None:
+        """Load of the rock on the bit: ``weight`` (N, up), ``torque`` (N m, against the drilling direction)."""
+        self.bit_load[:] = weight, torque
+        self.weight.value = weight
+        self.torque.value = torque
+
+    def residual(self, t: float, u: Array, u_dot: Array, out: Array) -> None:
+        """F(t, u, u-dot), shape (dofs,); end conditions replace the momentum rows of their dofs."""
+        self.set_state(u, u_dot)
+        self._residual(out)
+        rows = self._constrained
+        self.reaction[:] = out[rows]
+        out[rows] = u[rows]
+        if self.driven:
+            _, speed, _ = self.scene.top_drive.motion(t)
+            for row, share in self.driven.items():
+                out[row] -= share * speed
+
+    def jacobian(self, u: Array, u_dot: Array, shift: float, matrix: PETSc.Mat) -> None:
+        """dF/du + shift dF/du-dot at a state, with unit rows at the end conditions."""
+        self.set_state(u, u_dot)
+        self.shift.value = shift
+        self._jacobian(matrix)
+        matrix.zeroRows(self._constrained, diag=1.0)
+
+    def load_vector(self, constant: dolfinx.fem.Constant) -> Array:
+        """dF/d(constant) at the present state, shape (dofs,): the direction in which a load enters."""
+        unit = constant.value.copy()
+        other = [(c, c.value.copy()) for c in (self.weight, self.torque)]
+        ones, zeros = np.zeros(self.size), np.zeros(self.size)
+        for c, _ in other:
+            c.value = 0.0
+        self._residual(zeros)
+        constant.value = 1.0
+        self._residual(ones)
+        for c, value in other:
+            c.value = value
+        constant.value = unit
+        ones -= zeros
+        # differences of the internal forces leave round-off everywhere: a load at the bit touches its node only
+        keep = np.zeros(self.size, dtype=bool)
+        first = int(self.nodes[-1]) * self.ansatz.size
+        keep[first : first + self.ansatz.size] = True
+        ones[~keep] = 0.0
+        ones[self._constrained] = 0.0
+        return ones
+
+    @property
+    def size(self) -> int:
+        """Number of scalar unknowns."""
+        return len(self.u.x.array)
+
+    def reactions(self) -> dict[int, float]:
+        """Reaction (N or N m) at every constrained dof, from the last residual."""
+        return dict(zip(self._constrained.tolist(), self.reaction.tolist(), strict=True))
+
+    def top_torque(self) -> float:
+        """Torque of the drive on the string (N m) at the last residual."""
+        rows = self._constrained
+        return float(sum(x * self.reaction[np.searchsorted(rows, dof)] for dof, x in self.driven.items()))
+
+    def end_power(self) -> float:
+        """Power (W) that the hook load and the loads at the tip put into the string at the present state."""
+        u, total = self.u.x.array, 0.0
+        for node, load in ((0, self.loads.top), (-1, self.loads.bottom)):
+            for k in range(3):
+                name = f"v{k + 1}"
+                if load.force.value[k] != 0.0 and name in self.ansatz.v_names:
+                    total += load.force.value[k] * u[self.dof(node, name)]
+            if np.any(load.moment.value):
+                _, R = self.shape()
+                w = np.array([u[self.dof(node, n)] if n in self.ansatz.v_names else 0.0 for n in ("w1", "w2", "w3")])
+                total += load.moment.value @ (R[node] @ w)
+        return float(total)
+
+    # -- audits ------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _powers(self) -> dict[str, ScalarForm]:
+        terms = vw.powers(
+            self.ansatz, self.u, self.u_dot, self.s, self.section, self.loads, self.on, self.literal
+        )
+        power = {"damping": ScalarForm(terms["damping"])}
+        if self.loads.wall is not None:
+            power["wall"] = ScalarForm(terms["contact"] + terms["friction"])
+        return power
+
+    @cached_property
+    def _weight_vector(self) -> Array:
+        return VectorForm(self.terms["gravity"])(np.zeros(self.size))
+
+    def powers(self) -> dict[str, float]:
+        """Power (W) of damping, gravity and wall at the present state; positive takes energy from the string."""
+        power = {name: form() for name, form in self._powers.items() if name != "wall" or self._near_wall()}
+        power["gravity"] = float(self._weight_vector @ self._u)
+        return power
+
+    def _near_wall(self) -> bool:
+        """Whether any node comes within half of the clearance."""
+        block = self._u.reshape(-1, self.ansatz.size)
+        offset = [block[:, i] for i, name in enumerate(self.ansatz.x_names) if name in ("r1", "r2")]
+        if not offset:
+            return False
+        hole = self.scene.hole.diameter or 0.0
+        clearance = (hole - max(section.outer_diameter or 0.0 for section in self.scene.string)) / 2
+        return bool(max(np.abs(x).max() for x in offset) > clearance / 4)
+
+    @cached_property
+    def _kinetic(self) -> ScalarForm:
+        return ScalarForm(vw.kinetic_energy(self.ansatz, self.u, self.s, self.section, self.loads, self.on))
+
+    @cached_property
+    def _strain(self) -> ScalarForm:
+        x, _ = self.ansatz.split(self.u)
+        return ScalarForm(vw.strain_energy(self.ansatz, x, self.s, self.section, self.loads, self.on))
+
+    def energies(self) -> tuple[float, float]:
+        """Kinetic and strain energy (J) of the present state."""
+        return self._kinetic(), self._strain()
+
+    # -- fields for pictures -------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _resultants(self) -> dolfinx.fem.Expression:
+        x, v = self.ansatz.split(self.u)
+        at = self.ansatz.configuration(x, self.s)
+        n, m = elastic_resultants(at, self.section, self.loads.u0, self.literal)
+        n_v, m_v = viscous_resultants(at, self.ansatz.twist(v, at), self.section)
+        both = ufl.as_vector([*(n + n_v), *(m + m_v)])
+        return compile_expression(both, reference_nodes(self.V), self.mesh.comm)
+
+    def resultants(self) -> tuple[Array, Array]:
+        """Internal force (nodes, 3; N) and moment (nodes, 3; N m), material components, averaged at the nodes."""
+        cells = np.arange(self.mesh.topology.index_map(1).size_local, dtype=np.int32)
+        values = self._resultants.eval(self.mesh, cells).reshape(len(cells), -1, 6)
+        total, count = np.zeros((len(self.nodes), 6)), np.zeros(len(self.nodes))
+        np.add.at(total, self.V.dofmap.list, values)
+        np.add.at(count, self.V.dofmap.list, 1.0)
+        mean = (total / count[:, None])[self.nodes]
+        return mean[:, :3], mean[:, 3:]
+
+    def shape(self) -> tuple[Array, Array]:
+        """Centreline (nodes, 3; m) and rotation matrices (nodes, 3, 3) of the present state, from the top down."""
+        block = self.u.x.array.reshape(-1, self.ansatz.size)[self.nodes]
+        get = {name: block[:, i] for i, name in enumerate(self.ansatz.x_names)}
+        zero = np.zeros(len(block))
+        r = np.stack([get.get("r1", zero), get.get("r2", zero), get.get("r3", self.arc_length)], axis=1)
+        if isinstance(self.ansatz, Spatial):
+            a, b, c, d = (get[f"q_{k}"] for k in "abcd")
+        elif "theta" in get:
+            a, b, c, d = np.cos(get["theta"] / 2), zero, np.sin(get["theta"] / 2), zero
+        else:
+            a, b, c, d = np.cos(get["phi"] / 2), zero, zero, np.sin(get["phi"] / 2)
+        n = a * a + b * b + c * c + d * d
+        R = np.stack(
+            [
+                np.stack([a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (a * c + b * d)], axis=1),
+                np.stack([2 * (a * d + b * c), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)], axis=1),
+                np.stack([2 * (b * d - a * c), 2 * (a * b + c * d), a * a - b * b - c * c + d * d], axis=1),
+            ],
+            axis=1,
+        )
+        return r, R / n[:, None, None]
+
+    def fields(self) -> dict[str, Array]:
+        """What a picture needs, per node from the top down: position, directors, speeds, resultants, diameters."""
+        r, R = self.shape()
+        n, m = self.resultants()
+        block = self.u.x.array.reshape(-1, self.ansatz.size)[self.nodes]
+        out: dict[str, Array] = {
+            "position": r,
+            "director1": R[:, :, 0],
+            "director3": R[:, :, 2],
+            "axial_force": n[:, 2],
+            "torque": m[:, 2],
+            "bending_moment": np.hypot(m[:, 0], m[:, 1]),
+        }
+        named = {"w3": "spin", "v3": "axial_speed", "phi": "rotation"}
+        for component, name in named.items():
+            if component in self.ansatz.x_names + self.ansatz.v_names:
+                out[name] = block[:, self.ansatz.index(component)].copy()
+        return out
+
+    @cached_property
+    def outer_diameter(self) -> Array:
+        """Outer diameter at the nodes (m); at a change of section that of the upper one."""
+        ends = np.cumsum([section.length for section in self.scene.string])
+        of = np.searchsorted(ends, self.arc_length * (1 - 1e-12)).clip(max=len(ends) - 1)
+        return np.array([section.outer_diameter or 0.0 for section in self.scene.string])[of]

@@ -1,0 +1,452 @@
+"""Charts of a saved result: time series, spectra, the string's spin and speed over depth and time, and the rock."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from drillfem.render import style
+from drillfem.render.story import Story, attribute
+from drillfem.render.straight import depth_ticks, marks, place, rpm, subtitle
+from drillfem.results.spectra import Peak, amplitude_spectrum, dominant, evenly
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+ENVELOPE = 1500  # more samples than this are drawn as their range
+
+
+def curve(axes: Axes, time: np.ndarray, values: np.ndarray, colour: str, label: str | None = None) -> None:
+    """A line, or where there are more samples than the page has pixels, the range they cover and their running mean."""
+    if len(time) <= 2 * ENVELOPE:
+        axes.plot(time, values, color=colour, lw=1.2, label=label)
+        return
+    edges = np.linspace(0, len(time), ENVELOPE + 1).astype(int)[:-1]
+    low, high = np.minimum.reduceat(values, edges), np.maximum.reduceat(values, edges)
+    # neighbouring columns overlap by a sample, so that a steep line stays a line
+    low[1:], high[1:] = np.minimum(low[1:], values[edges[1:] - 1]), np.maximum(high[1:], values[edges[1:] - 1])
+    axes.fill_between(time[edges], low, high, color=colour, lw=0.8, alpha=0.9, label=label)
+
+
+def stuck(time: np.ndarray, spin: np.ndarray, limit: float) -> list[tuple[float, float]]:
+    """Intervals of time in which |spin| stays below the limit."""
+    still = np.concatenate([[False], np.abs(spin) < limit, [False]])
+    edges = np.flatnonzero(np.diff(still.astype(int)))
+    last = len(time) - 1
+    return [(float(time[a]), float(time[min(b, last)])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def zoom_window(time: np.ndarray) -> tuple[float, float]:
+    """The last few seconds: about three turns of the slowest wave of a 1200 m string, less for a short run."""
+    end, whole = float(time[-1]), float(time[-1] - time[0])
+    return end - min(5.0, whole / 4), end
+
+
+ROWS: tuple[tuple[str, str, float, str, str], ...] = (
+    # history name, words, factor, unit, colour
+    ("bit_angular_speed", "bit spin", 1.0, "rad/s", style.BLUE),
+    ("bit_axial_speed", "axial speed", 1e3, "mm/s", style.BLUE),
+    ("depth_of_cut", "depth of cut", 1e3, "mm", style.GREEN),
+    ("bit_weight", "weight on bit", 1e-3, "kN", style.GREEN),
+    ("bit_torque", "torque on bit", 1e-3, "kN m", style.GREEN),
+    ("bit_depth", "drilled depth", 1.0, "m", style.PURPLE),
+)
+
+
+def time_series(story: Story, path: Path) -> Path:
+    """time-series.png: what happened at the bit and to the energy, the whole run and its last seconds."""
+    history = story.history
+    time = np.asarray(history["time"].values, dtype=float)
+    rows = [row for row in ROWS if row[0] in history]
+    if not rows:
+        rows = [
+            (str(n), str(n).replace("_", " "), 1.0, str(v.attrs.get("units", "")), style.BLUE)
+            for n, v in history.data_vars.items()
+            if v.dims == ("time",) and not str(n).endswith("_energy")
+        ][:6]
+    energies = [str(n) for n in history.data_vars if str(n).endswith("_energy") and history[n].dims == ("time",)]
+    nominal = story.nominal
+    levels = {
+        "bit_angular_speed": nominal.speed, "bit_axial_speed": nominal.penetration, "depth_of_cut": nominal.depth_of_cut,
+        "bit_weight": nominal.weight, "bit_torque": nominal.torque,
+    }  # fmt: skip
+    count = len(rows) + bool(energies)
+    limit = float(attribute(story.scene, "bit", "torsional_regularisation", default=0.1))
+    start, stop = zoom_window(time)
+    near = (time >= start) & (time <= stop)
+    with style.page(1600, 1400 if count > 5 else 1200) as figure:
+        style.heading(figure, story.title, subtitle_of_history(story, time))
+        height = figure.get_size_inches()[1] * style.DPI
+        grid = figure.add_gridspec(
+            count, 2, width_ratios=[1.75, 1], left=0.075, right=0.985, top=1 - 125 / height, bottom=66 / height,
+            hspace=0.16, wspace=0.09,
+        )  # fmt: skip
+        axes_left: list[Axes] = []
+        for k in range(count):
+            for column, window in ((0, slice(None)), (1, near)):
+                axes = figure.add_subplot(grid[k, column])
+                t = time[window]
+                if k < len(rows):
+                    name, words, factor, unit, colour = rows[k]
+                    values = factor * np.asarray(history[name].values, dtype=float)[window]
+                    if name == "bit_angular_speed" and nominal.speed:
+                        shade_stick(axes, time, np.asarray(history[name].values), limit, column == 1)
+                    curve(axes, t, values, colour)
+                    level = levels.get(name)
+                    if level is not None:
+                        axes.axhline(factor * level, color=style.VERMILION, lw=1.1, ls=(0, (5, 3)), zorder=3)
+                    if name == "bit_depth" and nominal.penetration is not None:
+                        line = factor * nominal.penetration * (t - time[0])
+                        axes.plot(t, line, color=style.VERMILION, lw=1.1, ls=(0, (5, 3)), zorder=3)
+                    if column == 0:
+                        axes.set_ylabel(f"{words}\n({unit})")
+                else:
+                    for n, colour in zip(
+                        energies, (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.SKY), strict=False
+                    ):
+                        words = n.removesuffix("_energy").replace("_", " ")
+                        curve(axes, t, 1e-3 * np.asarray(history[n].values, dtype=float)[window], colour, words)
+                    if column == 0:
+                        axes.set_ylabel("energy\n(kJ)")
+                        axes.legend(loc="upper right", ncols=min(len(energies), 4), borderaxespad=0.1)
+                axes.set_xlim(float(t[0]), float(t[-1]))
+                axes.margins(y=0.12 if k < len(rows) else 0.5)
+                axes.yaxis.get_major_locator().set_params(nbins=5)
+                if k < count - 1:
+                    axes.tick_params(labelbottom=False)
+                else:
+                    axes.set_xlabel("load factor" if story.still else "time (s)")
+                if k == 0:
+                    axes.set_title("The whole run" if column == 0 else f"Its last {style.number(stop - start)} s")
+                if column == 0:
+                    axes_left.append(axes)
+        figure.align_ylabels(axes_left)
+        words = ["Dashed: the nominal steady state."] if any(v is not None for v in levels.values()) else []
+        if nominal.speed and "bit_angular_speed" in history:
+            share = stick_share(time, np.asarray(history["bit_angular_speed"].values), limit)
+            words.append(f"Orange: the bit sticks (below {limit:g} rad/s), {100 * share:.1f} % of the run.")
+        figure.text(0.985, 1 - 62 / height, "  ".join(words), ha="right", fontsize=10.5, color=style.GREY)
+        return style.save(figure, path)
+
+
+def subtitle_of_history(story: Story, time: np.ndarray) -> str:
+    """Model and the time that was simulated."""
+    words = [f"{story.model} model"] if story.model else []
+    words.append(f"{'load factor' if story.still else 'time'} {time[0]:g} to {time[-1]:.6g}{'' if story.still else ' s'}")
+    return "   \u00b7   ".join(words)
+
+
+def stick_share(time: np.ndarray, spin: np.ndarray, limit: float) -> float:
+    """Share of the time in which the bit stands."""
+    return sum(b - a for a, b in stuck(time, spin, limit)) / max(float(time[-1] - time[0]), 1e-12)
+
+
+def shade_stick(axes: Axes, time: np.ndarray, spin: np.ndarray, limit: float, near: bool) -> None:
+    """Orange where the bit stands: intervals in time, and in the overview a band in speed as well."""
+    for a, b in stuck(time, spin, limit):
+        if near or len(time) < 20000:
+            axes.axvspan(a, b, color=style.ORANGE, alpha=0.28, lw=0)
+    axes.axhspan(-limit, limit, color=style.ORANGE, alpha=0.55, lw=0, zorder=2.5)
+
+
+# -- spectra ----------------------------------------------------------------------------------------------------------
+def windows(time: np.ndarray) -> list[tuple[str, float, float]]:
+    """The thesis' S1, S2, S3 for a run of 200 s or more, else the first and the last third."""
+    start, end = float(time[0]), float(time[-1])
+    if start <= 0.5 and end >= 199.9:
+        return [("S1", 0.0, 20.0), ("S2", 90.0, 110.0), ("S3", 180.0, 200.0)]
+    third = (end - start) / 3
+    return [("first third", start, start + third), ("last third", end - third, end)]
+
+
+def spectra(story: Story, path: Path) -> Path | None:
+    """spectra.png: what frequencies the bit's two speeds have, in windows of time."""
+    history = story.history
+    time = np.asarray(history["time"].values, dtype=float)
+    wanted = [
+        ("bit_angular_speed", "Bit spin", 1.0, "rad/s", style.BLUE),
+        ("bit_axial_speed", "Axial speed of the bit", 1e3, "mm/s", style.GREEN),
+    ]
+    wanted = [row for row in wanted if row[0] in history]
+    if not wanted or len(time) < 64 or story.still:
+        return None
+    rows = windows(time)
+    fastest = 0.5 / float(np.median(np.diff(time)))
+    with style.page(1600, 1200) as figure:
+        style.heading(figure, f"{story.title}: spectra of the bit's speeds", subtitle_of_history(story, time))
+        grid = figure.add_gridspec(
+            len(rows), len(wanted), left=0.065, right=0.985, top=0.885, bottom=0.06, hspace=0.24, wspace=0.14
+        )
+        for column, (name, words, factor, unit, colour) in enumerate(wanted):
+            values = factor * np.asarray(history[name].values, dtype=float)
+            results = []
+            for _, a, b in rows:
+                near = (time >= a - 1e-9) & (time <= b + 1e-9)
+                even, signal = evenly(time[near], values[near])
+                step = float(even[1] - even[0])
+                results.append((*amplitude_spectrum(signal, step), dominant(signal, step, n=6)))
+            for row, ((label, a, b), (frequency, amplitude, waves)) in enumerate(zip(rows, results, strict=True)):
+                axes = figure.add_subplot(grid[row, column])
+                top = float(min(25.0, fastest))
+                shown = frequency <= top
+                f, y = frequency[shown], amplitude[shown]
+                axes.fill_between(f, 0, y, color=colour, alpha=0.22, lw=0)
+                axes.plot(f, y, color=colour, lw=1.3)
+                highest = max([float(y.max()), *(wave.amplitude for wave in waves if wave.frequency < top)])
+                roof = 1.28 * max(highest, 1e-12)
+                axes.set_xlim(0, top)
+                axes.set_ylim(0, roof)
+                name_peaks(axes, waves, top)
+                axes.set_title(f"{words}, {label}: {a:.4g} to {b:.4g} s")
+                axes.set_ylabel(f"amplitude ({unit})")
+                if row == len(rows) - 1:
+                    axes.set_xlabel("frequency (Hz)")
+        figure.text(
+            0.985, 1 - 62 / 1200, "Curve: 2|X|/N without window. Dots: waves found with a Hann window, their frequency and amplitude.",
+            ha="right", fontsize=10.5, color=style.GREY,
+        )  # fmt: skip
+        return style.save(figure, path)
+
+
+def name_peaks(axes: Axes, waves: list[Peak], top: float) -> None:
+    """Marks and labels at the dominant waves; a label that would cover a stronger wave's is left out."""
+    taken: list[tuple[float, float]] = []
+    roof = axes.get_ylim()[1]
+    for x, y in waves:
+        if x > top:
+            continue
+        axes.plot([x], [y], "o", ms=4.5, color=style.VERMILION, zorder=5)
+        if any(abs(x - u) < 0.095 * top and abs(y - v) < 0.21 * roof for u, v in taken):
+            continue
+        taken.append((x, y))
+        right = x > 0.9 * top
+        axes.annotate(
+            f"{x:.2f} Hz\n{style.number(y, 2)}", (x, y), xytext=(-7 if right else 7, 1), textcoords="offset points",
+            fontsize=10, va="bottom", ha="right" if right else "left", linespacing=1.05,
+        )  # fmt: skip
+
+
+# -- space and time -----------------------------------------------------------------------------------------------------
+def finest_window(times: np.ndarray, longest: float, least: int = 12) -> slice:
+    """The part of the saved poses to look at: the last stretch saved at the finest interval, at most `longest` s of it."""
+    steps = np.diff(times)
+    fine = steps < 1.5 * steps.min()
+    last = int(np.flatnonzero(fine)[-1]) + 1
+    first = last
+    while first > 0 and fine[first - 1] and times[last] - times[first - 1] <= longest:
+        first -= 1
+    if last - first + 1 < least:  # too few that are close: show all there is
+        return slice(0, len(times))
+    return slice(first, last + 1)
+
+
+def wave_speeds(story: Story) -> tuple[float | None, float | None]:
+    """Speeds of torsional and axial waves, m/s: sqrt(G/rho) and sqrt(E/rho); None where the scene does not give them."""
+    material = attribute(story.scene, "material")
+    density = attribute(material, "density")
+    shear, youngs = attribute(material, "shear_modulus"), attribute(material, "youngs_modulus")
+    ratio = attribute(material, "poisson_ratio")
+    if not density:
+        return None, None
+    if shear is None and youngs is not None and ratio is not None:
+        shear = youngs / (2 * (1 + ratio))
+    return (
+        math.sqrt(shear / density) if shear else None,
+        math.sqrt(youngs / density) if youngs else None,
+    )
+
+
+def space_time(story: Story, path: Path) -> Path | None:
+    """space-time.png: spin and axial speed over depth and time, so that waves are seen to travel."""
+    if story.fields is None or len(story.times) < 4 or story.still:
+        return None
+    names = [n for n in ("spin", "axial_speed") if n in story.colour_fields]
+    if story.sideways or not names:
+        names = [n for n in ("spin", "bending_moment", "curvature", "axial_force") if n in story.colour_fields][:2]
+    if not names:
+        return None
+    part = finest_window(story.times, 6.0)
+    times = story.times[part]
+    arc = story.arc - story.arc[0]
+    speeds = dict(zip(("spin", "axial_speed"), wave_speeds(story), strict=True))
+    coarse = float(np.median(np.diff(times)))
+    with style.page(1600, 1200 if len(names) > 1 else 900) as figure:
+        height = figure.get_size_inches()[1] * style.DPI
+        note = f"one pose every {style.number(coarse)} s"
+        fastest = speeds.get("spin")
+        if fastest and coarse > 0.25 * story.length / fastest:
+            note += ": too coarse to follow a wave; save more often with output.fields_interval"
+        style.heading(figure, f"{story.title}: waves along the string", f"{subtitle_of_history(story, times)}   \u00b7   {note}")
+        grid = figure.add_gridspec(
+            len(names), 2, width_ratios=[1, 0.016], left=0.065, right=0.93, top=1 - 130 / height, bottom=70 / height,
+            hspace=0.22, wspace=0.025,
+        )  # fmt: skip
+        for row, name in enumerate(names):
+            axes = figure.add_subplot(grid[row, 0])
+            values = story.values(name)[part]
+            factor, label = (1e3, "axial speed (mm/s)") if name == "axial_speed" else (1.0, story.label(name))
+            values = factor * values
+            middle = {"spin": story.nominal.speed, "axial_speed": story.nominal.penetration}.get(name)
+            if middle is not None:  # two-sided colours around the nominal state: slower and faster differ in hue
+                middle *= factor
+                low, high = style.band(values)
+                reach = max(middle - low, high - middle, 1e-9)
+                limits, colours = (middle - reach, middle + reach), "PuOr_r"
+            else:
+                limits, colours = style.band(values), "cividis"
+            image = axes.pcolormesh(
+                times, arc, values.T, cmap=colours, vmin=limits[0], vmax=limits[1], shading="gouraud", rasterized=True
+            )
+            axes.grid(False)
+            axes.set_ylim(float(arc[-1]), 0.0)
+            axes.set_yticks(depth_ticks(0.0, float(arc[-1])))
+            axes.set_ylabel("arc length from the top (m)")
+            axes.set_title(f"{name.replace('_', ' ').capitalize()}")
+            marks(axes, story, arc)
+            for section in story.parts if len(story.parts) > 1 else ():
+                axes.text(
+                    times[0] + 0.006 * (times[-1] - times[0]), section.top - story.arc[0] + 0.012 * story.length, section.name,
+                    va="top", fontsize=10, color=style.INK,
+                    bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 2},
+                )  # fmt: skip
+            speed = speeds.get(name)
+            if speed and coarse <= 0.25 * story.length / speed:
+                wave_guide(axes, times, story.length, speed)
+            bar = figure.colorbar(image, cax=figure.add_subplot(grid[row, 1]))
+            bar.set_label(label)
+            bar.outline.set_visible(False)  # type: ignore[operator]
+            if middle is not None:
+                bar.ax.axhline(middle, color=style.INK, lw=1.2)
+                bar.ax.set_title(f"nominal\n{style.number(middle, 4)}", fontsize=9, weight="normal", loc="center")
+            if row == len(names) - 1:
+                axes.set_xlabel("time (s)")
+        return style.save(figure, path)
+
+
+def wave_guide(axes: Axes, times: np.ndarray, length: float, speed: float) -> None:
+    """A line as steep as a wave travels, from the top to the bit, with its speed."""
+    start = times[0] + 0.82 * (times[-1] - times[0])
+    end = start + length / speed
+    if end > times[-1]:
+        return
+    axes.plot([start, end], [0, length], color=style.INK, lw=1.4, ls=(0, (6, 3)))
+    axes.annotate(
+        f"{speed:.0f} m/s", (start + 0.5 * length / speed, 0.5 * length), xytext=(8, 0), textcoords="offset points",
+        fontsize=10.5, bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 2},
+    )  # fmt: skip
+
+
+# -- the rock -------------------------------------------------------------------------------------------------------------
+def rock(story: Story, index: int, path: Path) -> Path | None:
+    """rock.png: the hole's bottom seen from above and unrolled, and how the profile behind a blade changed."""
+    found = story.rock(index)
+    if found is None or not len(story.blades) or not story.bit_radius:
+        return None
+    from drillfem.render.studio import rock_around
+
+    angle, depth = found
+    time = float(story.times[index])
+    azimuth, around = rock_around(angle, depth, story.blades, 0.0)
+    drilled = story.at("bit_depth", time)
+    face = float(depth.max()) if drilled is None else drilled
+    above = 1e3 * (face - around)  # mm above the bit's face
+    with style.page(1600, 1200) as figure:
+        spin = story.at("bit_angular_speed", time)
+        words = f"{subtitle(story, time)}   \u00b7   drilled {style.number(face, 4)} m"
+        if spin is not None:
+            words += f"   \u00b7   bit spin {rpm(spin)}"
+        style.heading(figure, f"{story.title}: the rock under the bit", words)
+        polar(figure, story, azimuth, above)
+        unrolled(figure, story, azimuth, above)
+        passage(figure, story, index)
+        return style.save(figure, path)
+
+
+def polar(figure: Figure, story: Story, azimuth: np.ndarray, above: np.ndarray) -> None:
+    """The bottom of the hole from above, as the driller would see it: the bit turns clockwise."""
+    axes = figure.add_axes((0.045, 0.375, 0.40, 0.46), projection="polar")
+    axes.set_theta_direction(-1)  # type: ignore[attr-defined]
+    axes.set_theta_zero_location("N")  # type: ignore[attr-defined]
+    order = np.argsort(azimuth % (2 * np.pi), kind="stable")
+    a, y = (azimuth % (2 * np.pi))[order], above[order]
+    edge = np.append(a, a[0] + 2 * np.pi)
+    theta, radius = np.linspace(0, 2 * np.pi, 721), np.array([0.1, 1.0]) * 1e3 * story.bit_radius
+    centre = 0.5 * (theta[1:] + theta[:-1])
+    height = np.interp(centre, np.concatenate([[a[-1] - 2 * np.pi], edge]), np.concatenate([[y[-1]], y, [y[0]]]))
+    image = axes.pcolormesh(theta, radius, height[None], cmap="cividis", shading="flat", rasterized=True)
+    for k, blade in enumerate(story.blades):
+        axes.plot([blade, blade], radius, color=style.INK, lw=5, solid_capstyle="butt")
+        axes.plot([blade, blade], radius, color=style.ORANGE, lw=2.6, solid_capstyle="butt")
+        axes.text(blade, 1.10 * radius[1], str(k + 1), ha="center", va="center", weight="bold")
+    axes.set_ylim(0, radius[1])
+    axes.set_yticks([])
+    axes.set_xticks([])
+    axes.grid(False)
+    axes.spines["polar"].set_visible(False)
+    axes.set_title(f"From above, radius {radius[1]:.0f} mm; blades turn clockwise", pad=34)
+    bar = figure.colorbar(image, ax=axes, shrink=0.75, pad=0.09)
+    bar.set_label("rock above the bit's face (mm)")
+    bar.outline.set_visible(False)  # type: ignore[operator]
+
+
+def unrolled(figure: Figure, story: Story, azimuth: np.ndarray, above: np.ndarray) -> None:
+    """Height of the rock all around, with the blades that cut it."""
+    axes = figure.add_axes((0.065, 0.075, 0.915, 0.215))
+    turn = np.degrees(azimuth % (2 * np.pi))
+    order = np.argsort(turn, kind="stable")
+    x, y = turn[order], above[order]
+    x, y = np.concatenate([x[-1:] - 360, x, x[:1] + 360]), np.concatenate([y[-1:], y, y[:1]])
+    floor = min(0.0, float(y.min())) - 0.28 * max(float(np.ptp(y)), 1e-6)
+    roof = float(y.max()) + 0.45 * max(float(np.ptp(y)), 1e-6)
+    axes.fill_between(x, floor, y, color=style.ORANGE, alpha=0.22, lw=0)
+    axes.plot(x, y, color="#6b4a1f", lw=1.8)
+    axes.axhline(0.0, color=style.INK, lw=0.9, ls=(0, (5, 3)))
+    thick = 6.0
+    for k, blade in enumerate(np.degrees(story.blades) % 360):
+        for shift in (0.0, 360.0):
+            left = blade + shift - thick
+            axes.fill([left, left + thick, left + thick, left], [0, 0, roof, roof], color=style.GREY, alpha=0.85, lw=0, zorder=4)
+        axes.text(blade + 1.5, 0.93 * roof, f"{k + 1}", va="top", weight="bold", zorder=5)
+    axes.annotate(
+        "turning", (0.985, 0.86), (0.90, 0.86), xycoords="axes fraction", textcoords="axes fraction", va="center", fontsize=11,
+        arrowprops={"arrowstyle": "-|>", "color": style.VERMILION, "lw": 2}, color=style.VERMILION, zorder=6,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 2},
+    )  # fmt: skip
+    axes.set_xlim(0, 360)
+    axes.set_ylim(floor, roof)
+    axes.set_xticks(np.arange(0, 361, 30))
+    axes.set_xlabel("angle on the bit, from its first blade (degrees)")
+    axes.set_ylabel("rock above\nthe face (mm)")
+    arc = 2 * math.pi * story.bit_radius * 1e3
+    axes.set_title(f"Unrolled: {arc:.0f} mm around, steps of {style.number(float(np.ptp(above)), 2)} mm")
+
+
+def passage(figure: Figure, story: Story, index: int) -> None:
+    """The profile behind one blade over the last saved times: what the next blade will meet."""
+    part = finest_window(story.times, 4.0)
+    chosen = [i for i in range(len(story.times))[part] if story.rock(i) is not None]
+    if len(chosen) < 3:
+        return
+    axes = figure.add_axes((0.545, 0.375, 0.365, 0.49))
+    reference = story.rock(index)
+    assert reference is not None
+    angle = np.linspace(float(reference[0][0]), float(reference[0][-1]), 90)
+    rows = []
+    for i in chosen:
+        a, d = story.rock(i) or reference
+        face = story.at("bit_depth", float(story.times[i]))
+        rows.append(1e3 * ((float(d.max()) if face is None else face) - np.interp(angle, a, d)))
+    image = axes.pcolormesh(np.degrees(angle), story.times[chosen], np.array(rows), cmap="cividis", shading="gouraud", rasterized=True)
+    axes.grid(False)
+    axes.set_xlabel("angle behind the blade (degrees)")
+    axes.set_ylabel("time (s)")
+    axes.set_title("The rock behind a blade over time")
+    box = axes.get_position()
+    bar = figure.colorbar(image, cax=figure.add_axes((box.x1 + 0.012, box.y0 + 0.06, 0.012, box.height - 0.12)))
+    bar.set_label("rock above the bit's face (mm)")
+    bar.outline.set_visible(False)  # type: ignore[operator]
+

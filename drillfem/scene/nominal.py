@@ -1,0 +1,197 @@
+"""Steady drilling, the numbers of Appendix C.2, and what `drillfem info` says about a scene."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from drillfem.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """Steady drilling without oscillation (5-25)-(5-28); SI units."""
+
+    depth_of_cut: float  # d_0 in m per turn, sum over the blades
+    rate_of_penetration: float  # V_0 in m/s
+    torque_on_bit: float  # T_0 in N m
+    hook_load: float  # H_0 in N
+    weight_on_bit: float  # W_0 in N
+
+
+def nominal(scene: Scene) -> Nominal:
+    """Steady drilling (5-26)-(5-28), totals over the blades.
+
+    d_0 = (W0 - sigma_1 a l)/(eps_1 a zeta), V_0 = d_0 Omega_0/(2 pi),
+    T_0 = (eps_1 d_0 + mu gamma sigma_1 l) a^2/2.
+    """
+    drive, bit, rock, weight = scene.top_drive, scene.bit, scene.rock, scene.weight
+    if bit is None or rock is None or bit.kind != "cutting":
+        return Nominal(0.0, 0.0, 0.0, weight, 0.0)
+    load = drive.weight_on_bit if drive.weight_on_bit is not None else weight - (drive.hook_load or 0.0)
+    flat = min(load, rock.contact_strength * bit.radius * bit.wear_flat_length)
+    depth = (load - flat) / (rock.intrinsic_specific_energy * bit.radius * bit.inclination)
+    torque = (
+        (rock.intrinsic_specific_energy * bit.radius * depth + bit.friction * bit.geometry * flat)
+        * bit.radius
+        / 2
+    )
+    return Nominal(depth, depth * (drive.speed or 0.0) / (2 * math.pi), torque, weight - load, load)
+
+
+@dataclass(frozen=True)
+class Dimensionless:
+    """Two-degree-of-freedom equivalent and its numbers, Appendix C.2.
+
+    The pipes are the spring; the last section (collars) and a third of the pipes' rotary inertia are the
+    mass (5-39)."""
+
+    torsional_stiffness: float  # C in N m/rad: polar, 938.1 for the thesis' string (its table prints half)
+    inertia: float  # I in kg m2
+    mass: float  # M in kg: the collars
+    time: float  # t* in s
+    length: float  # L* in m
+    psi: float  # system number
+    beta: float  # bit-rock interaction number
+    lambda_: float  # bluntness number
+    omega_0: float  # spin of the top
+    W_0: float  # weight on bit
+
+
+def dimensionless(scene: Scene) -> Dimensionless:
+    """Numbers of Appendix C.2 (C-1)-(C-7). Raises ValueError without a cutting bit."""
+    bit, rock = scene.bit, scene.rock
+    if bit is None or rock is None or bit.kind != "cutting":
+        raise ValueError("only a cutting bit has the numbers of Appendix C.2")
+    *pipes, collars = scene.string
+    pipes = pipes or [collars]  # a string of one section is its own spring
+    stiffness = 1 / math.fsum(s.length / s.section_stiffness().torsion for s in pipes)
+    alone = len(scene.string) == 1
+    inertia = scene.ends.bottom_inertia + math.fsum(2 * s.rotary_inertia * s.length / 3 for s in pipes)
+    inertia += 0 if alone else 2 * collars.rotary_inertia * collars.length
+    mass = scene.ends.bottom_mass + collars.mass_per_length * collars.length
+    energy, a, zeta = rock.intrinsic_specific_energy, bit.radius, bit.inclination
+    t, x = math.sqrt(inertia / stiffness), 2 * stiffness / (energy * a**2)
+    return Dimensionless(
+        stiffness,
+        inertia,
+        mass,
+        t,
+        x,
+        psi=zeta * energy * a * inertia / (mass * stiffness),
+        beta=bit.friction * bit.geometry * zeta,
+        lambda_=rock.contact_strength * bit.wear_flat_length / (zeta * energy * x),
+        omega_0=(scene.top_drive.speed or 0.0) * t,
+        W_0=scene.nominal().weight_on_bit / (zeta * energy * a * x),
+    )
+
+
+def torsional_frequency(scene: Scene) -> float:
+    """Lowest torsional natural frequency in Hz of the string, top held, bottom free to spin; exact.
+
+    Angle and torque are carried down the sections by their wave solution; the torque left over at the bottom
+    changes sign at the frequency. The thesis' string has 0.453 Hz (its 5.5.4).
+    """
+    data = [(s.length, s.section_stiffness().torsion, 2 * s.rotary_inertia) for s in scene.string]
+
+    def left_over(omega: float) -> float:
+        angle, torque = 0.0, 1.0
+        for length, stiffness, inertia in data:
+            k = omega * math.sqrt(inertia / stiffness)
+            c, s = math.cos(k * length), math.sin(k * length)
+            angle, torque = angle * c + torque * s / (stiffness * k), torque * c - angle * s * stiffness * k
+        return torque - omega**2 * scene.ends.bottom_inertia * angle
+
+    travel = math.fsum(length * math.sqrt(inertia / stiffness) for length, stiffness, inertia in data)
+    step = high = 0.02 / travel  # far below any distance between roots, which is about pi / travel
+    while left_over(high) > 0:
+        high += step
+        if high * travel > 10:  # cannot happen for a held top: the first root lies below pi / travel
+            raise ArithmeticError("no torsional natural frequency found")
+    low = high - step
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if left_over(middle) > 0 else (low, middle)
+    return low / (2 * math.pi)
+
+
+def quantity(value: float, unit: str) -> str:
+    """Value with four figures and a metric prefix on its unit: 45700, "N" -> "45.7 kN"."""
+    size = abs(value)
+    for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ")):
+        if size >= factor and unit[0] not in "kr":
+            return f"{value / factor:.4g} {prefix}{unit}"
+    return f"{value:.4g} {unit}"
+
+
+def describe(scene: Scene) -> list[tuple[str, str]]:
+    """What follows from a scene, as (label, value with unit), for `drillfem info`."""
+    model, reason = scene.resolved_model()
+    n, q = scene.nominal(), quantity
+    time = scene.time
+    run = (
+        f"{time.load_steps} load steps"
+        if time.analysis == "static"
+        else f"{time.start:g} to {time.end:g} s in steps of {q(time.step, 's')}"
+    )
+    rows = [
+        ("model", f"{model} ({reason})"),
+        ("reading", scene.reading),
+        ("run", run),
+        ("mesh", f"{scene.mesh.elements} elements of degree {scene.mesh.degree}"),
+        ("length", f"{scene.length:.6g} m"),
+    ]
+    if scene.mass > 0:
+        rows.append(("mass", f"{scene.mass:.6g} kg"))
+    if scene.weight > 0:
+        rows.append(("weight", f"{scene.weight / 1e3:.6g} kN"))
+    for s in scene.string:
+        k = s.section_stiffness()
+        label = f"{s.name}: "
+        rows.append(
+            (
+                label + "stiffness",
+                f"EA {q(k.axial, 'N')}, GA {q(k.shear1, 'N')}, EI {q(k.bending1, 'N m²')}, "
+                f"GJ {q(k.torsion, 'N m²')}",
+            )
+        )
+        if s.mass_per_length > 0 and s.rotary_inertia > 0:
+            rows.append(
+                (
+                    label + "wave speeds",
+                    f"axial {math.sqrt(k.axial / s.mass_per_length):.1f} m/s, torsional "
+                    f"{math.sqrt(k.torsion / (2 * s.rotary_inertia)):.1f} m/s",
+                )
+            )
+        if s.retardation_time > 0:
+            rows.append((label + "retardation time", q(s.retardation_time, "s")))
+    if scene.ends.top in ("driven", "clamped") and all(s.rotary_inertia > 0 for s in scene.string):
+        rows.append(("first torsional frequency", f"{torsional_frequency(scene):.4g} Hz"))
+    if scene.bit is not None:
+        rows += [("hook load", f"{n.hook_load / 1e3:.6g} kN"), ("weight on bit", q(n.weight_on_bit, "N"))]
+    if scene.bit is not None and scene.bit.kind == "cutting":
+        d = dimensionless(scene)
+        rows += [
+            ("nominal depth of cut", f"{q(n.depth_of_cut, 'm')} per turn, all {scene.bit.blades} blades"),
+            (
+                "nominal rate of penetration",
+                f"{q(n.rate_of_penetration, 'm/s')} ({n.rate_of_penetration * 3600:.4g} m/h)",
+            ),
+            ("nominal torque on bit", q(n.torque_on_bit, "N m")),
+            ("nominal power", q(n.torque_on_bit * (scene.top_drive.speed or 0.0), "W")),
+            ("blade passages", f"{scene.bit.blades * (scene.top_drive.speed or 0.0) / (2 * math.pi):.4g} Hz"),
+            (
+                "two-degree-of-freedom equivalent",
+                f"C {d.torsional_stiffness:.2f} N m/rad, I {d.inertia:.2f} kg m², "
+                f"M {d.mass:.1f} kg, {1 / (2 * math.pi * d.time):.4g} Hz",
+            ),
+            ("scales t*, L*", f"{d.time:.4g} s, {q(d.length, 'm')}"),
+            ("psi (system)", f"{d.psi:.4g}"),
+            ("beta (bit-rock)", f"{d.beta:.4g}"),
+            ("lambda (bluntness)", f"{d.lambda_:.4g}"),
+            ("omega_0 (speed)", f"{d.omega_0:.4g}"),
+            ("W_0 (weight on bit)", f"{d.W_0:.4g}"),
+        ]
+    return rows

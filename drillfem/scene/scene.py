@@ -1,0 +1,434 @@
+"""A scene: what is simulated, read from TOML, in SI units, and checked as a whole."""
+
+# ruff: noqa: RUF009 (key() is dataclasses.field with a fixed set of metadata)
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from drillfem.errors import SceneError
+from drillfem.scene.keys import complaint, guess, key, read, shown, write
+from drillfem.scene.nominal import Nominal, nominal
+from drillfem.scene.section import Material, Section
+from drillfem.scene.tables import (
+    E3,
+    Bit,
+    Contact,
+    Ends,
+    Gravity,
+    Hole,
+    Initial,
+    Mesh,
+    Output,
+    Reference,
+    Rock,
+    Time,
+    TopDrive,
+)
+
+MODELS = ("torsional", "axial-torsional", "planar", "spatial")  # from the poorest to the richest
+
+
+class ModelChoice(NamedTuple):
+    """The model that a scene runs with, and why."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that a simulation needs to know. To change it: `dataclasses.replace(...)`, then `.checked()`."""
+
+    string: tuple[Section, ...] = key("the sections of the string, from the top down")
+    title: str = key("one line that says what the scene is", default="", default_text="the name")
+    name: str = key("short name", default="", default_text="the file's name")
+    model: str = key(
+        "model; 'auto' takes the poorest that can represent the scene",
+        choices=(*MODELS, "auto"),
+        default="auto",
+    )
+    reading: str = key(
+        "'literal': the thesis as printed, where it and the recommended reading differ",
+        choices=("recommended", "literal"),
+        default="recommended",
+    )
+    material: Material | None = key("material of all sections without their own", default=None)
+    hole: Hole = key("the borehole", default=Hole())
+    contact: Contact | None = key("contact with the wall of the hole", default=None, default_text="none")
+    top_drive: TopDrive = key("what turns the string, and the weight on the bit", default=TopDrive())
+    bit: Bit | None = key("the bit", default=None, default_text="none")
+    rock: Rock | None = key("the rock; needed by a cutting bit", default=None, default_text="none")
+    initial: Initial = key("the state at the start", default=Initial())
+    ends: Ends = key("how the string is held and loaded at its ends", default=Ends())
+    reference: Reference = key("shape of the unstressed string", default=Reference())
+    gravity: Gravity = key("gravity", default=Gravity())
+    mesh: Mesh = key("finite elements along the string", default=Mesh())
+    time: Time = key("how time or load advances", default=Time())
+    output: Output = key("what is written, and how often", default=Output())
+
+    # -- reading and writing ------------------------------------------------------------------------------
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Scene:
+        """Scene from nested plain data: parsed TOML, or what `to_dict` gave. Raises SceneError."""
+        scene = read(
+            cls, {"time": {}, **data}
+        )._completed()  # an absent [time] lacks its end, and shall say so
+        for path, message in scene.problems():
+            raise complaint(data, path, message)
+        return scene
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nested plain SI data for TOML or JSON; `from_dict` gives an equal scene back."""
+        data = write(self)
+        for section in data["string"]:
+            if section.get("material") == data.get("material"):
+                section.pop("material", None)  # comes back from [material]
+        return data
+
+    def checked(self) -> Scene:
+        """The same scene, after all checks; for scenes changed in Python. Raises SceneError."""
+        return Scene.from_dict(self.to_dict())
+
+    def _completed(self) -> Scene:
+        """Defaults that depend on other keys, and every section with its material."""
+        time = self.time
+        if time.analysis == "static":
+            time = replace(time, start=0.0, end=1.0, step=1.0 / time.load_steps)
+        interval = self.output.interval or time.step
+        fields = self.output.fields_interval or max(interval, (time.end - time.start) / 20)
+        string = tuple(
+            s if s.stiffness or s.material else replace(s, material=self.material) for s in self.string
+        )
+        name = self.name or "scene"
+        return replace(
+            self,
+            string=string,
+            name=name,
+            title=self.title or name,
+            time=time,
+            output=replace(self.output, interval=interval, fields_interval=fields),
+        )
+
+    # -- what follows from the keys -----------------------------------------------------------------------
+    @property
+    def length(self) -> float:
+        """Length of the unstressed string in m."""
+        return math.fsum(s.length for s in self.string)
+
+    @property
+    def interfaces(self) -> tuple[float, ...]:
+        """Arc lengths in m of the top, the joints between sections, and the bottom."""
+        return tuple(math.fsum(s.length for s in self.string[:i]) for i in range(len(self.string) + 1))
+
+    @property
+    def mass(self) -> float:
+        """Mass in kg of the string with the lumps at its ends."""
+        return (
+            math.fsum(s.mass_per_length * s.length for s in self.string)
+            + self.ends.top_mass
+            + self.ends.bottom_mass
+        )
+
+    @property
+    def weight(self) -> float:
+        """Weight along e3 in N of the string with the lumps at its ends."""
+        return self.mass * self.gravity.magnitude * self.gravity.direction[2]
+
+    def nominal(self) -> Nominal:
+        """Steady drilling (5-25)-(5-28); zero depth of cut and torque without a cutting bit."""
+        return nominal(self)
+
+    def obstacle(self, model: str) -> str:
+        """Why `model` cannot represent this scene; empty if it can."""
+
+        def across(v: tuple[float, ...]) -> bool:
+            return abs(v[0]) > 1e-12 or abs(v[1]) > 1e-12
+
+        ends, gravity = self.ends, self.gravity.direction if self.gravity.magnitude else (0.0, 0.0, 0.0)
+        turns = self.top_drive.kind != "none"
+        motion = (self.initial.velocity, self.initial.angular_velocity)
+        if model in ("torsional", "axial-torsional"):
+            if self.reference.shape != "straight":
+                return f"the unstressed string is bent (reference.shape = {self.reference.shape!r})"
+            if across(gravity):
+                return "gravity acts across the string"
+            if across(ends.tip_force) or across(ends.tip_moment):
+                return "the load at the tip bends the string"
+            if (turns and across(self.top_drive.axis)) or any(map(across, motion)):
+                return "the motion is not along and about the string's axis"
+            if model == "torsional" and self.bit is not None and self.bit.kind == "cutting":
+                return "a cutting bit moves along the axis"
+            if model == "torsional" and (ends.tip_force[2] or motion[0][2]):
+                return "the string is loaded or moves along its axis"
+        if model == "planar":
+            if self.bit is not None:
+                return "a bit turns about the string's axis, which the plane x-z has no room for"
+            if turns and abs(abs(self.top_drive.axis[1]) - 1) > 1e-9:
+                return "the top drive turns about another axis than e2"
+            if self.reference.shape != "straight" and abs(self.reference.bend_towards[1]) > 1e-12:
+                return "the unstressed string is bent out of the plane x-z"
+            out = (
+                ends.tip_force[1],
+                gravity[1],
+                motion[0][1],
+                ends.tip_moment[0],
+                ends.tip_moment[2],
+                motion[1][0],
+                motion[1][2],
+            )
+            if any(abs(x) > 1e-12 for x in out):
+                return "loads or motions lead out of the plane x-z"
+        return ""
+
+    def resolved_model(self) -> ModelChoice:
+        """The model to run, and why: the one asked for, or for "auto" the poorest that represents the scene.
+
+        Axial-torsional if nothing bends the string, planar if all stays in the plane x-z, else spatial.
+        """
+        if self.model != "auto":
+            return ModelChoice(self.model, "asked for by the scene")
+        why = {m: self.obstacle(m) for m in MODELS}
+        if not why["axial-torsional"]:
+            return ModelChoice("axial-torsional", "the string is straight and nothing bends it")
+        if not why["planar"]:
+            return ModelChoice("planar", f"{why['axial-torsional']}, and all stays in the plane x-z")
+        return ModelChoice("spatial", f"{why['axial-torsional']}, and {why['planar']}")
+
+    # -- what must fit together ---------------------------------------------------------------------------
+    def problems(self) -> Iterator[tuple[str, str]]:
+        """(dotted key, message) for everything that does not fit together across tables."""
+        yield from self._string_problems()
+        yield from self._end_problems()
+        yield from self._drilling_problems()
+        yield from self._numerics_problems()
+        if self.model != "auto" and (why := self.obstacle(self.model)):
+            able = [m for m in MODELS if not self.obstacle(m)]
+            yield "model", f"must be one of {', '.join(able)}, auto for this scene: {why}"
+
+    def _string_problems(self) -> Iterator[tuple[str, str]]:
+        hole = self.hole.diameter
+        for i, s in enumerate(self.string):
+            here = f"string.{i}"
+            if s.stiffness is None and s.material is None:
+                yield "material", f"section {s.name!r} needs it (or its own material or stiffness)"
+            if s.stiffness is not None and self.time.analysis == "dynamic":
+                for name, given in (("mass_per_length", s.given_mass), ("rotary_inertia", s.given_inertia)):
+                    if given is None:
+                        yield f"{here}.{name}", "must be given > 0 for dynamics"
+            if hole is not None and s.outer_diameter is not None and hole <= s.outer_diameter:
+                yield (
+                    "hole.diameter",
+                    f"must be larger than {here}.outer_diameter = {s.outer_diameter:g} m "
+                    f"of section {s.name!r}",
+                )
+            if self.contact is not None and s.outer_diameter is None:
+                yield f"{here}.outer_diameter", "must be given in m for contact"
+        if self.contact is not None and self.hole.kind == "none":
+            yield "hole.kind", "must be 'straight' where there is [contact]"
+        if hole is not None and self.bit is not None and 2 * self.bit.radius > 1.05 * hole:
+            yield "bit.radius", f"must be about half of hole.diameter = {hole:g} m, which the bit drills"
+
+    def _end_problems(self) -> Iterator[tuple[str, str]]:
+        drive, ends = self.top_drive, self.ends
+        if ends.top == "driven" and drive.kind == "none":
+            yield (
+                "ends.top",
+                "must be one of clamped, pinned, hung, free, or there must be a [top_drive] with kind "
+                "imposed-speed or imposed-angle",
+            )
+        if self.bit is not None and drive.axis != E3:
+            yield "top_drive.axis", "must be [0, 0, 1] where there is a [bit]"
+        if self.bit is not None and self.reference.shape != "straight":
+            yield "reference.shape", "must be 'straight' where there is a [bit]"
+        if ends.top != "driven" and drive.kind != "none":
+            yield "ends.top", f"must be 'driven' where top_drive.kind = {drive.kind!r}"
+        if ends.bottom == "bit" and self.bit is None:
+            yield "ends.bottom", "must be one of free, guided, clamped, or there must be a [bit]"
+        if ends.bottom != "bit" and self.bit is not None:
+            yield "ends.bottom", "must be 'bit' where there is a [bit]"
+        held = ends.top in ("clamped", "hung", "driven") or ends.bottom == "clamped"
+        if self.time.analysis == "static" and not held:
+            yield (
+                "ends.top",
+                "must be one of clamped, hung, driven for statics, or the string can move freely",
+            )
+
+    def _drilling_problems(self) -> Iterator[tuple[str, str]]:
+        drive, bit, rock = self.top_drive, self.bit, self.rock
+        if bit is None:
+            if drive.weight_on_bit is not None:
+                yield "top_drive.weight_on_bit", "must be left out where there is no [bit]"
+            if drive.hook_load is not None:
+                yield "top_drive.hook_load", "must be left out where there is no [bit]"
+            if self.initial.state in ("nominal", "literal"):
+                yield "initial.state", "must be one of rest, given where there is no [bit]"
+            return
+        if bit.kind == "free":
+            if drive.weight_on_bit:
+                yield (
+                    "top_drive.weight_on_bit",
+                    "must be 0 or left out for bit.kind = 'free', which carries nothing",
+                )
+            if drive.hook_load is not None:
+                yield "top_drive.hook_load", "must be left out for bit.kind = 'free': it is the whole weight"
+            return
+        if rock is None:
+            yield (
+                "rock",
+                "a table with intrinsic_specific_energy, contact_strength, contact_strength_stalled, "
+                "surface is needed by bit.kind = 'cutting'",
+            )
+            return
+        if self.time.analysis == "static":
+            yield "time.analysis", "must be 'dynamic' for bit.kind = 'cutting'"
+        if drive.kind == "none":
+            yield "top_drive.kind", "must be one of imposed-speed, imposed-angle for bit.kind = 'cutting'"
+        if drive.weight_on_bit is None and drive.hook_load is None:
+            yield (
+                "top_drive.weight_on_bit",
+                "must be a number >= 0 in N, or give top_drive.hook_load in its place",
+            )
+        weight, at_bit = self.weight, self.nominal().weight_on_bit
+        if drive.hook_load is not None and at_bit <= 0:
+            yield (
+                "top_drive.hook_load",
+                f"must be less than the string's weight {weight:.6g} N, or the bit is lifted",
+            )
+        if at_bit > weight:
+            yield "top_drive.weight_on_bit", f"must not exceed the string's weight {weight:.6g} N"
+        flat = rock.contact_strength * bit.radius * bit.wear_flat_length
+        if self.initial.state in ("nominal", "literal"):
+            if drive.speed is not None and drive.speed <= 0:
+                yield "top_drive.speed", "must be > 0 rad/s to start from steady drilling"
+            if drive.profile == "spin-up":
+                yield "initial.state", "must be one of rest, given for top_drive.profile = 'spin-up'"
+            if at_bit <= flat:
+                yield (
+                    "top_drive.hook_load" if drive.weight_on_bit is None else "top_drive.weight_on_bit",
+                    f"{at_bit:.6g} N on the bit must exceed {flat:.6g} N, which the wear flats carry "
+                    "(rock.contact_strength * bit.radius * bit.wear_flat_length), or nothing is cut",
+                )
+
+    def _numerics_problems(self) -> Iterator[tuple[str, str]]:
+        time, output = self.time, self.output
+        if self.mesh.elements < len(self.string):
+            yield "mesh.elements", f"must be at least one for each of the {len(self.string)} sections"
+        ratio = output.interval / time.step
+        if not time.adaptive and (round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-6 * ratio):
+            yield "output.interval", f"must be a whole multiple of time.step = {time.step:g} s"
+        if output.checkpoint_interval < time.step:
+            yield "output.checkpoint_interval", f"must not be shorter than time.step = {time.step:g} s"
+        if output.interval > time.end - time.start:
+            yield "output.interval", f"must not exceed the run of {time.end - time.start:g} s"
+        if output.fields_interval < output.interval * (1 - 1e-9):
+            yield (
+                "output.fields_interval",
+                f"must not be shorter than output.interval = {output.interval:g} s",
+            )
+        if time.engine == "condensed" and (model := self.resolved_model().name) not in (
+            "axial-torsional",
+            "torsional",
+        ):
+            yield "time.engine", f"must be one of default, petsc for the model {model}, which is not linear"
+
+
+# -- files ------------------------------------------------------------------------------------------------
+def _folder() -> Path:
+    package = Path(__file__).resolve().parents[1]
+    shipped = package / "scenes"
+    return shipped if shipped.is_dir() else package.parent / "demos" / "scenes"
+
+
+def builtin_scenes() -> dict[str, str]:
+    """Names of the built-in scenes, with their titles."""
+    return {p.stem: str(_parse(p).get("title", p.stem)) for p in sorted(_folder().glob("*.toml"))}
+
+
+def load_scene(name_or_path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scene:
+    """Read, complete and check a scene.
+
+    name_or_path: name of a built-in scene, or a TOML file. overrides: values by dotted key (`bit.blades`,
+    `string.0.length`); text is taken as TOML (`6`, `[1, 0, 0]`, `true`) or else as it stands (`4 in`,
+    `spatial`); None removes the key.
+
+    Raises SceneError: one line with the key, its value and what is allowed.
+    """
+    text = str(name_or_path)
+    names = [p.stem for p in sorted(_folder().glob("*.toml"))]
+    path = _folder() / f"{text}.toml" if text in names else Path(text)
+    try:
+        if not _exists(path):
+            if path.suffix == ".toml" or path.name != text:
+                raise SceneError("no such file")
+            raise SceneError(f"no such file and no built-in scene: {guess(text, names)}")
+        data = _parse(path)
+        for dotted, value in (overrides or {}).items():
+            _override(data, dotted, value)
+        return Scene.from_dict({"name": path.stem, **data})
+    except SceneError as error:
+        raise SceneError(" ".join(f"scene {text or repr(text)}: {error}".split())) from None
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # a name that no file can have
+        return False
+
+
+def _parse(path: Path) -> dict[str, Any]:
+    if path.is_dir():
+        raise SceneError("is a folder, must be a TOML file")
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise SceneError(f"is not UTF-8 text (byte {error.start})") from None
+    except (ValueError, RecursionError) as error:
+        raise SceneError(f"is not valid TOML: {error}") from None
+    except OSError as error:
+        raise SceneError(f"cannot be read: {error.strerror}") from None
+
+
+def _override(data: dict[str, Any], dotted: str, value: Any) -> None:
+    parts = dotted.split(".")
+    if not all(p.strip() for p in parts):
+        raise SceneError(
+            f"override {dotted!r} = {shown(value)}: must be key=value with a key such as bit.blades or "
+            "string.0.length"
+        )
+    if isinstance(value, str):
+        try:
+            parsed = tomllib.loads(f"value = {value}")
+            value = parsed["value"] if len(parsed) == 1 else value
+        except (ValueError, RecursionError):
+            pass  # plain text: a unit string or a name
+    here: Any = data
+    for i, part in enumerate(parts):
+        last = i == len(parts) - 1
+        path = ".".join(parts[: i + 1])
+        if isinstance(here, list):
+            if not (part.isdecimal() and int(part) < len(here)):
+                raise SceneError(
+                    f"override {path} = {shown(value)}: must be a number from 0 to {len(here) - 1} after "
+                    f"{'.'.join(parts[:i])}"
+                )
+            place: Any = int(part)
+        elif isinstance(here, dict):
+            place = part
+            if not last:
+                here.setdefault(part, {})
+        else:
+            raise SceneError(
+                f"override {dotted} = {shown(value)}: {'.'.join(parts[:i])} = {shown(here)} is no table"
+            )
+        if last and value is None and isinstance(here, dict):
+            here.pop(place, None)
+        elif last:
+            here[place] = value
+        else:
+            here = here[place]

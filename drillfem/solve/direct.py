@@ -1,0 +1,302 @@
+"""Runs through PETSc: any rung of the ladder, dynamic (TS) or static (SNES)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from .contact import RockContact
+from ..compat import Array
+from ..errors import SimulationError
+from ..models.initial import initial_state
+from ..models.rod import Rod
+from ..results import ResultWriter
+from .audit import WORKS, EnergyAudit
+from .dynamics import Stepper
+from .newton import turn_between
+from .statics import Statics
+
+Observer = Callable[[float], None]
+
+DRILLING = {
+    "bit_angular_speed": "rad/s",
+    "bit_axial_speed": "m/s",
+    "bit_angle": "rad",
+    "bit_depth": "m",
+    "bit_torque": "N m",
+    "bit_weight": "N",
+    "depth_of_cut": "m",
+    "rock_removed": "m",
+}
+COMMON = {
+    "top_torque": "N m",
+    "top_angular_speed": "rad/s",
+    "hook_load": "N",
+    "top_power": "W",
+    "kinetic_energy": "J",
+    "strain_energy": "J",
+}
+TIP = {"tip_x": "m", "tip_y": "m", "tip_z": "m"}
+
+
+def variables(drilling: bool) -> dict[str, str]:
+    """History variables of a run, name to unit."""
+    return COMMON | dict.fromkeys(WORKS, "J") | (DRILLING if drilling else TIP)
+
+
+class DirectRun:
+    """A dynamic run of a rod: stepper, rock and audit, advanced step by step, with a state that can be saved."""
+
+    def __init__(self, rod: Rod) -> None:
+        self.rod, scene = rod, rod.scene
+        u0 = initial_state(rod)
+        self.rock = RockContact.from_scene(scene) if rod.has_bit else None
+        self.stepper = Stepper(rod, u0, self.rock)
+        self.bit_angle = 0.0
+        self.depth_start = float(u0[rod.bit.depth]) if rod.has_bit else 0.0
+        self.steps = 0
+        self._mark_bit(u0)
+        self._first_row(u0)
+
+    # -- start ---------------------------------------------------------------------------------------------------------
+
+    def _mark_bit(self, u: Array) -> None:
+        if not self.rod.has_bit:
+            return
+        at = self.rod.bit
+        rotation = u[at.rotation]
+        self.rotation = rotation.copy() if isinstance(at.rotation, slice) else float(rotation)
+        self.stepper.newton.start_rotation = self.rotation
+        # the surface knows depths from the start of the run
+        self.stepper.newton.start_depth = self.depth_start
+
+    def _first_row(self, u: Array) -> None:
+        rod = self.rod
+        if self.rock is not None:
+            at = rod.bit
+            rod.set_bit_load(*self.rock.at_rest(u[at.speed], u[at.spin], 0.0))
+        rod.residual(rod.scene.time.start, u, np.zeros_like(u), np.empty_like(u))
+        kinetic, strain = rod.energies()
+        self.audit = EnergyAudit(kinetic + strain, rod.scene.time.start, self._powers(rod.scene.time.start))
+
+    # -- one step ------------------------------------------------------------------------------------------------------
+
+    def _powers(self, t: float) -> dict[str, float]:
+        """Powers at the state last evaluated (the integrator's stage)."""
+        rod = self.rod
+        p = rod.powers()
+        spin = rod.scene.top_drive.motion(t)[1]
+        bit = 0.0
+        if rod.has_bit:
+            u, at = rod.u.x.array, rod.bit
+            bit = float(rod.bit_load @ (u[at.speed], u[at.spin]))
+        return {
+            "work_top_drive": rod.top_torque() * spin,
+            "work_gravity": -p["gravity"],
+            "work_hook": rod.end_power(),
+            "work_bit": bit,
+            "work_damping": p["damping"],
+            "work_wall": p.get("wall", 0.0),
+        }
+
+    def step(self, until: float) -> float:
+        """One accepted step; moves the rock, books the energy. Returns the time."""
+        rod = self.rod
+        before = self.stepper.u[rod.bit.speed] if self.rock is not None else 0.0
+        report = self.stepper.step(until)
+        self.audit.add(report.stage_time, self._powers(report.stage_time))
+        if self.rock is not None:
+            u, at = self.stepper.u, rod.bit
+            rotation = u[at.rotation]
+            turn = turn_between(self.rotation, rotation)
+            self.bit_angle += turn
+            self.rock.commit(turn, u[at.depth] - self.depth_start, report.step, before, u[at.speed], u[at.spin])
+            self._mark_bit(u)
+        self.steps += 1
+        return report.time
+
+    def row(self, t: float) -> dict[str, float]:
+        """History row of the present state."""
+        rod, u = self.rod, self.stepper.u
+        reaction = rod.top_torque()
+        rod.set_state(u, rod.u_dot.x.array)
+        kinetic, strain = rod.energies()
+        speed = rod.scene.top_drive.motion(t)[1]
+        out = {
+            "top_torque": reaction,
+            "top_angular_speed": speed,
+            "hook_load": -float(rod.loads.top.force.value[2]),
+            "top_power": reaction * speed,
+            "kinetic_energy": kinetic,
+            "strain_energy": strain,
+            **self.audit.works,
+        }
+        self.energy_error = self.audit.error(kinetic + strain)
+        if self.rock is not None:
+            at = rod.bit
+            return out | {
+                "bit_angular_speed": float(u[at.spin]),
+                "bit_axial_speed": float(u[at.speed]),
+                "bit_angle": self.bit_angle,
+                "bit_depth": float(u[at.depth]) - self.depth_start,
+                "bit_torque": float(rod.bit_load[1]),
+                "bit_weight": float(rod.bit_load[0]),
+                "depth_of_cut": self.rock.depth_of_cut(),
+                "rock_removed": self.rock.removed,
+            }
+        r, _ = rod.shape()
+        return out | dict(zip(TIP, r[-1].tolist(), strict=True))
+
+    def fields(self) -> dict[str, Array]:
+        """Fields along the string at the present state."""
+        self.rod.set_state(self.stepper.u, self.rod.u_dot.x.array)
+        out = self.rod.fields() | {"s": self.rod.arc_length}
+        return out | (self.rock.picture() if self.rock is not None else {})
+
+    # -- save and load -------------------------------------------------------------------------------------------------
+
+    def save(self) -> dict[str, Any]:
+        """Everything that a continuation needs."""
+        rod = self.rod
+        state: dict[str, Any] = {
+            "u": self.stepper.u.copy(),
+            "bit_load": rod.bit_load.copy(),
+            "bit_angle": self.bit_angle,
+            "steps": self.steps,
+            "newton_iterations": self.stepper.newton.iterations,
+            "rejected": self.stepper.rejected,
+            "audit_time": self.audit.time,
+            "audit_start": self.audit.stored_at_start,
+            "audit_scale": self.audit.scale,
+            "powers": dict(self.audit.powers),
+            "works": dict(self.audit.works),
+            "time_step": self.stepper.ts.getTimeStep(),
+        }
+        if self.rock is not None:
+            state["rock"] = self.rock.save()
+        return state
+
+    def load(self, t: float, state: dict[str, Any]) -> None:
+        """Continue from a saved state."""
+        rod, stepper = self.rod, self.stepper
+        stepper.vec.setArray(state["u"])
+        stepper.ts.setTime(t)
+        stepper.ts.setTimeStep(float(state["time_step"]))
+        rod.set_bit_load(*state["bit_load"])
+        self.bit_angle, self.steps = float(state["bit_angle"]), int(state["steps"])
+        stepper.newton.iterations, stepper.rejected = int(state["newton_iterations"]), int(state["rejected"])
+        self.audit = EnergyAudit(
+            float(state["audit_start"]),
+            float(state["audit_time"]),
+            {k: float(v) for k, v in state["powers"].items()},
+            {k: float(v) for k, v in state["works"].items()},
+            float(state["audit_scale"]),
+        )
+        if self.rock is not None:
+            self.rock.load(state["rock"])
+        self._mark_bit(stepper.u)
+
+    def summary(self) -> dict[str, Any]:
+        """Counts for the summary."""
+        return {
+            "steps": self.steps,
+            "newton_iterations": self.stepper.newton.iterations,
+            "rejected_steps": self.stepper.rejected,
+            "energy_balance_error": self.energy_error,
+            "factorisations": self.stepper.newton.factorisations,
+        }
+
+    energy_error = 0.0
+
+    def destroy(self) -> None:
+        """Free the PETSc objects."""
+        self.stepper.destroy()
+
+
+def grid(start: float, interval: float, after: float) -> Iterator[float]:
+    """Times start + k interval that lie after ``after``."""
+    k = math.floor((after - start) / interval + 1e-9) + 1
+    while True:
+        yield start + k * interval
+        k += 1
+
+
+def run_dynamic(scene: Any, writer_of: Callable[..., ResultWriter], until: float, progress: Observer | None) -> Any:
+    """March a scene to ``until``, writing as it goes. Returns the Result."""
+    rod = Rod(scene)
+    run = DirectRun(rod)
+    writer = writer_of(rod.model, rod.size, variables(rod.has_bit))
+    start = scene.time.start
+    out = scene.output
+    try:
+        with writer:
+            t = start
+            if writer.restart is not None:
+                t, state = writer.restart
+                run.load(t, state)
+            elif until > start:
+                writer.append(t, run.row(t))
+                writer.field(t, run.fields())
+            run.stepper.restart()
+            rows, pictures = grid(start, out.interval, t), grid(start, out.fields_interval, t)
+            saves = grid(start, out.checkpoint_interval, t)
+            next_row, next_picture, next_save = next(rows), next(pictures), next(saves)
+            tiny = 1e-9 * max(1.0, abs(until))
+            while t < until - tiny:
+                t = run.step(min(next_row, next_picture, next_save, until))
+                if t >= next_row - tiny or t >= until - tiny:
+                    writer.append(t, run.row(t))
+                    writer.update(**run.summary())
+                    next_row = next(rows)
+                    if progress is not None:
+                        progress(t)
+                if t >= next_picture - tiny:
+                    writer.field(t, run.fields())
+                    next_picture = next(pictures)
+                if t >= next_save - tiny:
+                    writer.checkpoint(t, run.save())
+                    run.stepper.restart()
+                    next_save = next(saves)
+            return writer.finish({**run.summary(), "converged": True})
+    finally:
+        run.destroy()
+
+
+def run_static(scene: Any, writer_of: Callable[..., ResultWriter], progress: Observer | None) -> Any:
+    """Follow the loads of a static scene from 0 to 1; the load factor stands on the time axis."""
+    rod = Rod(scene)
+    statics = Statics(rod)
+    u0 = initial_state(rod)
+    writer = writer_of(rod.model, len(statics.x.x.array), variables(False))
+    force, moment, g = (c.value.copy() for c in (rod.tip_force, rod.tip_moment, rod.loads.g))
+    n = len(rod.ansatz.x_names)
+
+    def set_load(factor: float) -> None:
+        rod.tip_force.value, rod.tip_moment.value, rod.loads.g.value = factor * force, factor * moment, factor * g
+
+    def record(factor: float, x: Array) -> None:
+        u = np.zeros((len(rod.nodes), rod.ansatz.size))
+        u[:, :n] = x.reshape(-1, n)
+        rod.set_state(u.reshape(-1), np.zeros(rod.size))
+        r, _ = rod.shape()
+        zero = dict.fromkeys([*COMMON, *WORKS], 0.0)
+        writer.append(factor, zero | {"strain_energy": rod.energies()[1]} | dict(zip(TIP, r[-1].tolist(), strict=True)))
+        writer.field(factor, rod.fields() | {"s": rod.arc_length})
+        if progress is not None:
+            progress(factor)
+
+    with writer:
+        x0 = statics.start(u0)
+        set_load(0.0)
+        record(0.0, x0)
+        factors = np.arange(1, scene.time.load_steps + 1) / scene.time.load_steps
+        done = statics.solve(x0, factors, set_load, record)
+        return writer.finish(
+            {"steps": done.load_steps, "newton_iterations": done.newton_iterations, "converged": True}
+        )
+
+
+__all__ = ["DirectRun", "SimulationError", "run_dynamic", "run_static", "variables"]

@@ -1,0 +1,115 @@
+"""Run a scene: choose the engine, write the results, continue what was stopped."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import SceneError
+from ..results import Result, ResultWriter, open_result
+from ..scene import Scene
+
+log = logging.getLogger("drillfem")
+
+#: progress(t, t_end, simulated per wall second)
+Progress = Callable[[float, float, float], None]
+
+
+def engine_of(scene: Scene) -> str:
+    """The engine a scene runs on: the straight drilling string is condensed to its bit, all else goes through PETSc."""
+    if scene.time.engine != "default":
+        return scene.time.engine
+    model = scene.resolved_model().name
+    condensed = (
+        model == "axial-torsional"
+        and scene.bit is not None
+        and scene.bit.kind == "cutting"
+        and scene.time.analysis == "dynamic"
+        and scene.time.integrator in ("default", "exact")
+    )
+    return "condensed" if condensed else "petsc"
+
+
+def _run(scene: Scene, out: Path | None, until: float | None, progress: Progress | None, resume: bool) -> Result:
+    end = scene.time.end if until is None else until
+    if not end > scene.time.start:
+        raise SceneError(f"until = {end:g} s: must be later than the start of the scene, {scene.time.start:g} s")
+    engine = engine_of(scene)
+    began, first = time.perf_counter(), [scene.time.start]
+
+    def tell(t: float) -> None:
+        if progress is not None:
+            wall = time.perf_counter() - began
+            progress(t, end, (t - first[0]) / wall if wall > 0 else 0.0)
+
+    def writer(model: str, dofs: int, variables: dict[str, str]) -> ResultWriter:
+        w = ResultWriter(out, scene, model, dofs, variables, resume)
+        if w.restart is not None:
+            first[0] = w.restart[0]
+        w.update(engine=engine)
+        return w
+
+    if scene.time.analysis == "static":
+        from .direct import run_static
+
+        return run_static(scene, writer, tell)  # type: ignore[no-any-return]
+    if engine == "condensed":
+        from .straight import run_condensed
+
+        return run_condensed(scene, writer, end, tell)
+    from .direct import run_dynamic
+
+    return run_dynamic(scene, writer, end, tell)  # type: ignore[no-any-return]
+
+
+def simulate(
+    scene: Scene, out: str | Path | None = None, progress: Progress | None = None, until: float | None = None
+) -> Result:
+    """Simulate a scene.
+
+    scene: what to simulate. out: new folder for the result, or None to keep it in memory. progress: called with
+    (time reached, time of the end, simulated seconds per wall second). until: stop at this time (s) rather than at
+    ``time.end``.
+
+    Raises SceneError (bad input; nothing is written) and SimulationError (what was computed is kept in ``out``).
+    """
+    return _run(scene, None if out is None else Path(out), until, progress, resume=False)
+
+
+def resume(folder: str | Path, progress: Progress | None = None, until: float | None = None) -> Result:
+    """Continue the run in ``folder`` from its last checkpoint, as if it had never stopped.
+
+    Rows behind the checkpoint are computed again; the continued history equals that of an uninterrupted run bit for
+    bit. ``until`` may lie beyond the scene's end. Raises SceneError if there is nothing to continue.
+    """
+    stored = open_result(folder)
+    scene = stored.scene
+    if scene is None:
+        raise SceneError(f"{folder}: its manifest holds no scene, it cannot be continued")
+    end = scene.time.end if until is None else until
+    reached = float(stored.history["time"][-1])
+    if scene.time.analysis == "static" or (stored.summary.get("converged") and reached >= end * (1 - 1e-12)):
+        raise SceneError(f"{folder}: has reached t = {reached:g} s; give a later time to continue (--until)")
+    return _run(scene, Path(folder), end, progress, resume=True)
+
+
+def certify(scene: Scene, until: float | None = None, starts: int = 4) -> dict[str, Result]:
+    """The same scene with half the step, with twice the elements, and from nearby initial states.
+
+    Keys: ``half step``, ``double mesh``, ``start 1`` ... A number is worth what these leave unchanged.
+    """
+    half = replace(scene, time=replace(scene.time, step=scene.time.step / 2)).checked()
+    mesh = replace(scene.mesh, elements=2 * scene.mesh.elements)
+    rock = scene.rock
+    if rock is not None:
+        rock = replace(rock, surface=replace(rock.surface, elements=2 * rock.surface.elements))
+    double = replace(scene, mesh=mesh, rock=rock).checked()
+    runs = {"half step": half, "double mesh": double}
+    for k in range(1, starts + 1):
+        nearby = replace(scene.initial, seed_perturbation=1e-3, seed=k)
+        runs[f"start {k}"] = replace(scene, initial=nearby).checked()
+    return {name: simulate(s, until=until) for name, s in runs.items()}

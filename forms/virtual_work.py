@@ -1,0 +1,251 @@
+"""The weak form of Appendix D as a dictionary of named virtual-work terms.
+
+Sign: every term is on the left of ``sum of the terms = 0``, so inertia and internal work are positive and
+loads are negative. A term along the actual twist instead of a virtual one is its power: the energy audit
+evaluates the very terms that are solved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import ufl
+from ufl.core.expr import Expr
+
+from .ansatz import Ansatz
+from .constitutive import Section, elastic_resultants, viscous_resultants
+from .kinematics import Configuration, Twist, strain_rates, strains
+
+Terms = dict[str, ufl.Form]
+
+
+@dataclass(frozen=True)
+class Measures:
+    """Where the terms are integrated.
+
+    ``internal``: elastic and viscous work, reduced rule so that slender elements do not lock.
+    ``mass``: inertia and distributed loads. ``nodal``: the kinematic relations, collocated at the nodes.
+    ``wall``: contact. ``top``, ``bottom``: the two ends.
+    """
+
+    internal: ufl.Measure
+    mass: ufl.Measure
+    nodal: ufl.Measure
+    wall: ufl.Measure
+    top: ufl.Measure
+    bottom: ufl.Measure
+
+
+@dataclass(frozen=True)
+class EndLoad:
+    """Load on an end: force (3, N) and moment (3, N m), spatial components; attached mass (kg) and inertia (kg m2)."""
+
+    force: Expr
+    moment: Expr
+    mass: Expr
+    inertia: Expr
+
+
+@dataclass(frozen=True)
+class Wall:
+    """Straight round hole along e3 with penalty contact and regularised Coulomb friction (spec 5).
+
+    ``clearance_radius``: hole radius (m); stiffness k_s (N/m2); static and dynamic friction; velocity scale n (s/m);
+    regularisation eps. ``projected``: friction along the wall only (else the literal, unprojected velocity).
+    """
+
+    hole_radius: Expr
+    stiffness: Expr
+    friction_static: Expr
+    friction_dynamic: Expr
+    velocity_scale: Expr
+    regularisation: Expr
+    projected: bool = True
+
+
+def inertia(twist: Twist, rate: Twist, virtual: Twist, section: Section) -> Expr:
+    """rho A v-dot . dr + (Theta w-dot + w x Theta w) . dtheta (2-51), (2-61), per length."""
+    spin = section.Theta * rate.w + ufl.cross(twist.w, section.Theta * twist.w)
+    return section["mass"] * ufl.dot(rate.v, virtual.v) + ufl.dot(spin, virtual.w)
+
+
+def _radial(x: Configuration) -> tuple[Expr, Expr]:
+    """Offset from the axis of a straight hole: vector (3) and length, without 0/0 on the axis."""
+    offset = ufl.as_vector((x.r[0], x.r[1], 0))
+    return offset, ufl.sqrt(ufl.dot(offset, offset) + 1e-24)
+
+
+def wall_pressure(x: Configuration, section: Section, wall: Wall) -> Expr:
+    """Normal force per length k_s max(0, |r_r| - clearance) (4-5), (4-6)."""
+    _, distance = _radial(x)
+    return wall.stiffness * ufl.max_value(0.0, distance - (wall.hole_radius - section["outer_radius"]))
+
+
+def friction_coefficient(speed: Expr, wall: Wall) -> Expr:
+    """mu-tilde = k_fr/|v_c| of (4-7), (4-9) (spec 5.3); its product with |v_c| peaks at friction_static."""
+    n, mu_s, mu_d = wall.velocity_scale, wall.friction_static, wall.friction_dynamic
+    alpha = ufl.sqrt(mu_s * (mu_s - mu_d))
+    return (mu_d * ufl.sqrt(speed**2 + wall.regularisation / n**2) + 2 * alpha / n) / (speed**2 + 1 / n**2)
+
+
+def contact(x: Configuration, virtual: Twist, section: Section, wall: Wall) -> Expr:
+    """Virtual work of the wall's normal force, per length (arm and force are parallel: no moment)."""
+    offset, distance = _radial(x)
+    return wall_pressure(x, section, wall) * ufl.dot(offset, virtual.v) / distance
+
+
+def friction(x: Configuration, twist: Twist, virtual: Twist, section: Section, wall: Wall) -> Expr:
+    """Virtual work of the wall friction on the touching point, per length (4-7)-(4-12)."""
+    offset, distance = _radial(x)
+    normal = offset / distance
+    arm = section["outer_radius"] * normal
+
+    def touching_point(t: Twist) -> Expr:
+        return t.v + ufl.cross(x.R * t.w, arm)
+
+    v_c = touching_point(twist)
+    if wall.projected:
+        v_c = v_c - ufl.dot(v_c, normal) * normal
+    mu = friction_coefficient(ufl.sqrt(ufl.dot(v_c, v_c) + 1e-24), wall)
+    return wall_pressure(x, section, wall) * mu * ufl.dot(v_c, touching_point(virtual))
+
+
+def end_load(x: Configuration, twist: Twist, rate: Twist, virtual: Twist, load: EndLoad) -> Expr:
+    """Virtual work at an end: applied load and the inertia of what is attached there."""
+    applied = ufl.dot(load.force, virtual.v) + ufl.dot(load.moment, x.R * virtual.w)
+    return load.mass * ufl.dot(rate.v, virtual.v) + load.inertia * ufl.dot(rate.w, virtual.w) - applied
+
+
+def bit_load(x: Configuration, virtual: Twist, tangent: Expr, weight: Expr, torque: Expr) -> Expr:
+    """Virtual work of the rock on the bit: force -W t, moment -T t along the hole's tangent (errata 49)."""
+    return weight * ufl.dot(tangent, virtual.v) + torque * ufl.dot(tangent, x.R * virtual.w)
+
+
+@dataclass(frozen=True)
+class Loads:
+    """What acts on the rod besides itself. ``bit`` = (tangent, weight, torque); absent parts are None."""
+
+    g: Expr
+    u0: Expr
+    top: EndLoad
+    bottom: EndLoad
+    bit: tuple[Expr, Expr, Expr] | None = None
+    wall: Wall | None = None
+
+
+def virtual_work(
+    x: Configuration,
+    twist: Twist,
+    rate: Twist,
+    virtual: Twist,
+    section: Section,
+    loads: Loads,
+    on: Measures,
+    literal: bool = False,
+) -> Terms:
+    """Every term of the balance of momentum and moment of momentum (D-2), (D-3), by name.
+
+    x, twist, rate: configuration, velocity and acceleration. ``virtual``: test motion, or the twist itself for power.
+    """
+    dv, du = strain_rates(x, virtual)
+    n, m = elastic_resultants(x, section, loads.u0, literal)
+    n_v, m_v = viscous_resultants(x, twist, section)
+    terms: Terms = {
+        "inertia": inertia(twist, rate, virtual, section) * on.mass,
+        "internal force": ufl.dot(n, dv) * on.internal,
+        "internal moment": ufl.dot(m, du) * on.internal,
+        "damping": (ufl.dot(n_v, dv) + ufl.dot(m_v, du)) * on.internal,
+        "gravity": -section["mass"] * ufl.dot(loads.g, virtual.v) * on.mass
+        - loads.top.mass * ufl.dot(loads.g, virtual.v) * on.top
+        - loads.bottom.mass * ufl.dot(loads.g, virtual.v) * on.bottom,
+        "top drive": end_load(x, twist, rate, virtual, loads.top) * on.top,
+        "tip load": end_load(x, twist, rate, virtual, loads.bottom) * on.bottom,
+    }
+    if loads.wall is not None:
+        terms["contact"] = contact(x, virtual, section, loads.wall) * on.wall
+        terms["friction"] = friction(x, twist, virtual, section, loads.wall) * on.wall
+    if loads.bit is not None:
+        terms["bit"] = bit_load(x, virtual, *loads.bit) * on.bottom
+    return terms
+
+
+def dynamic_terms(
+    a: Ansatz,
+    u: Expr,
+    u_dot: Expr,
+    test: Expr,
+    s: Expr,
+    section: Section,
+    loads: Loads,
+    on: Measures,
+    literal: bool = False,
+) -> Terms:
+    """Semi-discrete system F(t, u, u-dot) = 0 of an ansatz: virtual work and kinematic relations (D-2)-(D-4).
+
+    u, u_dot, test: fields of shape (a.size,). Returns the named terms; their sum is F.
+    """
+    (x, v), (x_dot, v_dot), (test_x, test_v) = a.split(u), a.split(u_dot), a.split(test)
+    at = a.configuration(x, s)
+    terms = virtual_work(
+        at, a.twist(v, at), a.twist(v_dot, at), a.twist(test_v, at), section, loads, on, literal
+    )
+    terms["kinematics"] = ufl.dot(test_x, x_dot - a.rate(x, v)) * on.nodal
+    return terms
+
+
+def powers(
+    a: Ansatz, u: Expr, u_dot: Expr, s: Expr, section: Section, loads: Loads, on: Measures, literal: bool = False
+) -> Terms:
+    """Power of every term (W): the same virtual work along the actual twist; their sum vanishes."""
+    (x, v), (_, v_dot) = a.split(u), a.split(u_dot)
+    at = a.configuration(x, s)
+    twist = a.twist(v, at)
+    return virtual_work(at, twist, a.twist(v_dot, at), twist, section, loads, on, literal)
+
+
+def static_terms(
+    a: Ansatz, x: Expr, test: Expr, s: Expr, section: Section, loads: Loads, on: Measures, literal: bool = False
+) -> Terms:
+    """Equilibrium in the configuration fields alone; x, test of shape (len(a.x_names),).
+
+    The ansatz' constraint (|q| = 1) closes the system, weighted by the mean bending stiffness so that its rows have
+    the size of the others.
+    """
+    at = a.configuration(x, s)
+    still = Twist(0 * at.r, 0 * at.u_m)
+    virtual = a.variation(test, x)
+    terms = virtual_work(at, still, still, virtual, section, loads, on, literal)
+    g = a.constraint(x)
+    if g is not None:
+        # dg . test / 2 = q . dq: the direction that no virtual rotation spans
+        q, dq = x, test
+        along = sum(q[i] * dq[i] for i in range(3, 7))
+        terms["constraint"] = section["torsion"] * g * along * on.nodal
+    return terms
+
+
+def kinetic_energy(a: Ansatz, u: Expr, s: Expr, section: Section, loads: Loads, on: Measures) -> ufl.Form:
+    """Kinetic energy of rod and attached masses (J)."""
+    x, v = a.split(u)
+    at = a.configuration(x, s)
+    t = a.twist(v, at)
+
+    def at_end(load: EndLoad) -> Expr:
+        return (load.mass * ufl.dot(t.v, t.v) + load.inertia * ufl.dot(t.w, t.w)) / 2
+
+    density = section["mass"] * ufl.dot(t.v, t.v) + ufl.dot(t.w, section.Theta * t.w)
+    return density / 2 * on.mass + at_end(loads.top) * on.top + at_end(loads.bottom) * on.bottom
+
+
+def strain_energy(a: Ansatz, x: Expr, s: Expr, section: Section, loads: Loads, on: Measures) -> ufl.Form:
+    """Elastic energy (J) in the configuration fields ``x``; the wall's penalty energy is not part of it."""
+    at = a.configuration(x, s)
+    v_m, u_m = strains(at)
+    n, m = elastic_resultants(at, section, loads.u0)
+    return (ufl.dot(n, v_m - ufl.as_vector((0, 0, 1))) + ufl.dot(m, u_m - loads.u0)) / 2 * on.internal
+
+
+def total(terms: Mapping[str, ufl.Form]) -> ufl.Form:
+    """Sum of the named terms."""
+    return sum(terms.values(), start=ufl.Form([]))
