@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
-from scipy.sparse.linalg import eigsh
+from scipy.sparse.linalg import eigs
 
 from ..compat import Array
 from ..errors import SimulationError
@@ -82,14 +82,18 @@ def natural_frequencies(rod: Rod, count: int = 10, u: Array | None = None) -> di
     out = {}
     for family, dofs in families.items():
         k, c, m = (X[dofs][:, dofs] for X in (K, C, M))
-        if abs(k - k.T).max() > 1e-7 * abs(k).max():
-            raise SimulationError("natural frequencies need conservative loads: a dead moment on a rod that bends is none")
         scale = _slow(rod, family)
-        wanted = min(count + 6, len(dofs) - 1)
-        squares, vectors = eigsh((k + k.T) / 2, wanted, (m + m.T) / 2, sigma=-scale, which="LM")
-        order = np.argsort(squares)
-        order = order[squares[order] > 1e-3 * scale][:count]
+        wanted = min(count + 6, len(dofs) - 2)
+        # not quite symmetric: virtual rotations are interpolated, the quaternions that they vary are too
+        squares, vectors = eigs(k, wanted, m, sigma=-scale, which="LM")
+        order = np.argsort(squares.real)
+        order = order[squares.real[order] > 1e-3 * scale][:count]
         squares, vectors = squares[order], vectors[:, order]
+        if np.any(abs(squares.imag) > 1e-3 * squares.real):
+            raise SimulationError("natural frequencies need conservative loads: a dead moment on a rod that bends is none")
+        # two real shapes out of a conjugate pair
+        squares, vectors = squares.real, np.where(squares.imag < 0, vectors.imag, vectors.real)
+        vectors = vectors / np.sqrt(np.einsum("ij,ij->j", vectors, m @ vectors))
         omega = np.sqrt(squares)
         shape = np.zeros((len(order), K.shape[0]))
         shape[:, dofs] = vectors.T

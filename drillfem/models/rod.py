@@ -329,9 +329,13 @@ class Rod:
             power["wall"] = ScalarForm(terms["contact"] + terms["friction"])
         return power
 
+    def gravity_vector(self) -> Array:
+        """Virtual work of gravity in every dof (dofs,), on the left-hand side: minus the nodal weights."""
+        return VectorForm(self.terms["gravity"])(np.zeros(self.size))
+
     @cached_property
     def _weight_vector(self) -> Array:
-        return VectorForm(self.terms["gravity"])(np.zeros(self.size))
+        return self.gravity_vector()
 
     def powers(self) -> dict[str, float]:
         """Power (W) of damping, gravity and wall at the present state; positive takes energy from the string."""
@@ -412,6 +416,8 @@ class Rod:
         n, m = self.resultants()
         block = self.u.x.array.reshape(-1, self.ansatz.size)[self.nodes]
         out: dict[str, Array] = {
+            "arc_length": self.arc_length,
+            "outer_diameter": self.outer_diameter,
             "position": r,
             "director1": R[:, :, 0],
             "director3": R[:, :, 2],
@@ -419,7 +425,7 @@ class Rod:
             "torque": m[:, 2],
             "bending_moment": np.hypot(m[:, 0], m[:, 1]),
         }
-        named = {"w3": "spin", "v3": "axial_speed", "phi": "rotation"}
+        named = {"w3": "spin", "v3": "axial_speed", "phi": "angle"}
         for component, name in named.items():
             if component in self.ansatz.x_names + self.ansatz.v_names:
                 out[name] = block[:, self.ansatz.index(component)].copy()

@@ -123,7 +123,7 @@ def tube_of(story: Story, pose: Pose, thick: float, texture: np.ndarray | None, 
     v = (arc - arc[0]) / (arc[-1] - arc[0])
     meshes = tube(position, d1, d3, thick * radius, v)
     if texture is None:
-        return [Thing(m, colour, specular=0.0, ambient=0.62) for m in meshes]
+        return [Thing(m, colour, specular=0.0, ambient=0.68, diffuse=0.28) for m in meshes]
     return [Thing(m, texture=texture) for m in meshes]
 
 
@@ -142,8 +142,8 @@ def ghost_tones(count: int) -> list[tuple[float, ...]]:
 
 
 def stripe_towards(pose: Pose, view: View) -> float:
-    """Angle from d1 of the painted stripe: 0, or that of +-d2 where a string that moves in a plane hides d1."""
-    if not view.flat or np.abs(pose.director1 @ view.near).max() > 0.3:
+    """Angle from d1 of the painted stripe: 0, or that of +-d2 where the view hides d1."""
+    if (pose.director1 @ view.near).mean() > 0.3:
         return 0.0
     d2 = np.cross(pose.director3, pose.director1)
     return float(np.copysign(np.pi / 2, (d2 @ view.near).mean()))
@@ -319,17 +319,17 @@ def draw_floor(axes: Axes, story: Story, view: View, ground: Floor, pose: Pose, 
         out = spots.mean(axis=0) - centre
         out = out / np.linalg.norm(out)
         for spot, tick in zip(spots[1:-1], ticks[1:-1], strict=True):
-            at = spot + 0.04 * size * out
+            at = spot + 0.05 * size * out
             axes.text(at[0], at[1], style.number(float(tick), 4), ha="center", va="center", fontsize=10, clip_on=False)
-        at = spots.mean(axis=0) + 0.115 * size * out
+        at = spots.mean(axis=0) + 0.19 * size * out
         axes.text(at[0], at[1], f"{name} (m)", ha="center", va="center", fontsize=11, clip_on=False)
     tip = pose.position[-1]
     drop = np.stack([view.project(tip), page(tip[i], tip[j], level)])
     axes.plot(drop[:, 0], drop[:, 1], color=style.GREY, lw=1, ls=(0, (2, 2)), zorder=4)
     foot = np.array(page(tip[i], tip[j], (level + tip[k]) / 2))
     axes.text(
-        foot[0] + 0.02 * size, foot[1], f"{AXES[k]} = {style.number(float(tip[k]), 4)} m",
-        fontsize=10, va="center", color=style.GREY, zorder=6,
+        foot[0] - 0.02 * size, foot[1], f"{AXES[k]} = {style.number(float(tip[k]), 4)} m",
+        fontsize=10.5, va="center", ha="right", color=style.GREY, zorder=6,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.5},
     )  # fmt: skip
 
@@ -368,7 +368,7 @@ def beside(figure: Figure, story: Story, brush: Brush, index: int, height: int) 
             axes.set_xlabel("arc length (m)")
             axes.set_xlim(0, float(arc[-1]))
             axes.margins(y=0.18)
-            axes.legend(loc="best")
+            axes.legend(loc="lower right", bbox_to_anchor=(1.02, 0.98), handlelength=1.2)
             limits = axes.get_ylim()
             bar = place(figure, x + w + 6, 130 + k * (h + 86), 14, h - 26)
             bar.imshow(brush.cmap(brush.norm(np.linspace(limits[1], limits[0], 256)))[:, None], extent=(0, 1, *limits), aspect="auto")
@@ -388,7 +388,7 @@ def beside(figure: Figure, story: Story, brush: Brush, index: int, height: int) 
             axes.set_title("Tip position (m)")
             axes.margins(x=0, y=0.2)
             axes.set_xlabel("load factor" if story.still else "time (s)")
-            axes.legend(loc="best", ncols=3)
+            axes.legend(loc="lower right", bbox_to_anchor=(1.02, 0.98), ncols=3, handlelength=1.4, columnspacing=1.2)
         else:
             time = story.history["time"].values
             total = np.zeros(len(time))
@@ -403,7 +403,7 @@ def beside(figure: Figure, story: Story, brush: Brush, index: int, height: int) 
             axes.set_title("Energy (J)")
             axes.margins(x=0, y=0.2)
             axes.set_xlabel("load factor" if story.still else "time (s)")
-            axes.legend(loc="best", ncols=3)
+            axes.legend(loc="lower right", bbox_to_anchor=(1.02, 0.98), ncols=3, handlelength=1.4, columnspacing=1.2)
 
 
 def true_poses_page(studio: Studio, story: Story, field: str | None, index: int, path: Path) -> Path:

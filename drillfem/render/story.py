@@ -241,9 +241,12 @@ class Story:
         return out
 
     def rock(self, index: int) -> tuple[np.ndarray, np.ndarray] | None:
-        """Angles behind the blade (rad, from 0) and depths of the rock surface (m, positive down), or None."""
+        """Angles behind the blade (rad, from 0) and depths of the rock surface (m, positive down), or None.
+
+        As saved with the fields, else from the bit's path in the history.
+        """
         if self.fields is None or "rock_height" not in self.fields or "rock_angle" not in self.fields:
-            return None
+            return self._rock_from_path(float(self.times[index])) if self.fields is not None else None
         variable = self.fields["rock_height"]
         angle = np.asarray(self.fields["rock_angle"].values, dtype=float)
         angle = angle[index] if angle.ndim == 2 else angle
@@ -255,6 +258,29 @@ class Story:
         angle, depth = angle[good], depth[good]
         order = np.argsort(angle, kind="stable")
         return angle[order], depth[order]
+
+    def _rock_from_path(self, time: float) -> tuple[np.ndarray, np.ndarray] | None:
+        """What the blades left: at each angle the greatest depth that any of them had when it passed there."""
+        if not len(self.blades) or "bit_angle" not in self.history or "bit_depth" not in self.history:
+            return None
+        past = self.history["time"].values <= time + 1e-9
+        turned = np.maximum.accumulate(np.asarray(self.history["bit_angle"].values, dtype=float)[past])
+        depth = np.maximum.accumulate(np.asarray(self.history["bit_depth"].values, dtype=float)[past])
+        if len(turned) < 2:
+            return None
+        gaps = np.diff(np.append(self.blades, self.blades[0] + 2 * math.pi))
+        sector = float(gaps[0]) if np.ptp(gaps) < 1e-9 else 2 * math.pi
+        behind = np.linspace(0.0, sector, 97)
+        passed = float(turned[-1]) - (behind[:, None] + self.blades[None, :]) % (2 * math.pi)
+        found = np.interp(passed, turned, depth)
+        # before the run the bit drilled steadily
+        slope = (self.nominal.depth_of_cut or 0.0) / (2 * math.pi)
+        found = np.where(passed < turned[0], depth[0] - slope * (turned[0] - passed), found)
+        surface = found.max(axis=1)
+        if sector < 2 * math.pi:  # the last point is what the next blade meets: it has not cut there yet
+            others = (behind[-1] + self.blades) % (2 * math.pi) > 1e-9
+            surface[-1] = found[-1, others].max()
+        return behind, surface
 
     def at(self, name: str, time: float) -> float | None:
         """A history value at a time, linearly between its neighbours; None if the history has no such name."""

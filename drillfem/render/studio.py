@@ -54,6 +54,7 @@ class Thing:
     opacity: float = 1.0
     specular: float = 0.25
     ambient: float = 0.26
+    diffuse: float = 0.88
     lighting: bool = True
 
 
@@ -96,7 +97,7 @@ class Studio:
                 "specular": thing.specular,
                 "specular_power": 18,
                 "ambient": thing.ambient,
-                "diffuse": 1.14 - thing.ambient,
+                "diffuse": thing.diffuse,
                 "lighting": thing.lighting,
                 "smooth_shading": "Normals" in thing.mesh.point_data,
                 "show_scalar_bar": False,

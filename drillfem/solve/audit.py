@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 WORKS = {
     "work_top_drive": "work put in by the top drive",
     "work_gravity": "work of gravity",
-    "work_hook": "work of the hook load and other end forces",
+    "work_hook_load": "work of the hook load and other end forces",
     "work_bit": "work taken by the rock",
-    "work_damping": "work lost to internal damping",
+    "dissipated": "work lost to internal damping",
     "work_wall": "work of contact and friction at the wall",
 }
 
@@ -36,10 +36,10 @@ class EnergyAudit:
     def error(self, stored: float) -> float:
         """Relative error of the balance: missing energy over the largest energy in play."""
         w = self.works
-        put_in = w["work_top_drive"] + w["work_gravity"] + w["work_hook"]
-        taken = w["work_bit"] + w["work_damping"] + w["work_wall"]
+        put_in = w["work_top_drive"] + w["work_gravity"] + w["work_hook_load"]
+        taken = w["work_bit"] + w["dissipated"] + w["work_wall"]
         self.scale = max(
-            self.scale, stored, abs(w["work_top_drive"]), abs(w["work_gravity"] + w["work_hook"]), abs(taken)
+            self.scale, stored, abs(w["work_top_drive"]), abs(w["work_gravity"] + w["work_hook_load"]), abs(taken)
         )
         missing = put_in - taken - (stored - self.stored_at_start)
         return abs(missing) / self.scale if self.scale > 0 else 0.0

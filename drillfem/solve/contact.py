@@ -7,11 +7,32 @@ from typing import Any
 import numpy as np
 
 from ..bitrock.law import BitLaw
-from ..bitrock.solve import solve_bit
-from ..bitrock.surface import RockSurface, ahead
+from ..bitrock.solve import bit_step
+from ..bitrock.surface import RockSurface
 from ..compat import Array
 from ..models.rock import advection_operators
 from ..scene import Scene
+
+
+def rock_picture(surface: RockSurface, points: int = 97) -> dict[str, Array]:
+    """Surface of all sectors in turn (one sector for equal blades), resampled so that every picture has one size."""
+    angles, heights, start = [], [], 0.0
+    for (eta, height), width in zip(surface.profile(), surface.data.width, strict=True):
+        at = np.linspace(0.0, width, points)
+        angles.append(start + at)
+        heights.append(np.interp(at, eta, height))
+        start += width
+    return {"rock_angle": np.concatenate(angles), "rock_height": np.concatenate(heights)}
+
+
+def surface_of(scene: Scene) -> RockSurface:
+    """Rock surface of a scene, in nominal drilling; the operators of scheme dg come from the UFL form."""
+    bit, rock = scene.bit, scene.rock
+    assert bit is not None and rock is not None
+    operators = None
+    if rock.surface.scheme == "dg":
+        operators = advection_operators(rock.surface.degree, rock.surface.elements, 2 * np.pi / bit.blades)
+    return RockSurface.from_scene(scene, operators)
 
 
 class RockContact:
@@ -20,21 +41,12 @@ class RockContact:
     def __init__(self, law: BitLaw, surface: RockSurface, spin: float) -> None:
         self.law, self.surface = law, surface
         self._par = law.array
-        m = len(surface.data.width)
-        self._ref, self._height, self._slope = np.zeros(2), np.zeros((2, m)), np.zeros((2, m))
-        self._work = np.empty(m)
         self.spin, self.depth = spin, 0.0
 
     @classmethod
     def from_scene(cls, scene: Scene) -> RockContact:
         """Rock of a scene, in nominal drilling; DG operators come from the UFL form."""
-        bit, rock = scene.bit, scene.rock
-        assert bit is not None and rock is not None
-        operators = None
-        if rock.surface.scheme == "dg":
-            width = 2 * np.pi / bit.blades
-            operators = advection_operators(rock.surface.degree, rock.surface.elements, width)
-        return cls(BitLaw.from_scene(scene), RockSurface.from_scene(scene, operators), scene.top_drive.speed or 0.0)
+        return cls(BitLaw.from_scene(scene), surface_of(scene), scene.top_drive.speed or 0.0)
 
     def at_rest(self, speed: float, spin: float, depth: float) -> tuple[float, float]:
         """Weight and torque (N, N m) of a bit that moves like this on the present surface."""
@@ -53,15 +65,10 @@ class RockContact:
         turn: float,
         turn_compliance: float,
     ) -> tuple[float, float]:
-        """See :class:`drillfem.solve.newton.BitLoad`; the rock ahead is linearised at the turn that is expected."""
-        data, ref = self.surface.data, self._ref
-        ref[0], ref[1] = max(turn - turn_compliance * self._torque, 0.0), min(turn - turn_compliance * self._torque, 0.0)
-        ahead(data, ref[0], True, self._height[0], self._slope[0])
-        ahead(data, ref[1], False, self._height[1], self._slope[1])
-        rho = turn_compliance / spin_compliance
-        found = solve_bit(
+        """See :class:`drillfem.solve.newton.BitLoad`."""
+        found = bit_step(
             self._par,
-            data.share,
+            self.surface.data,
             speed,
             speed_compliance,
             depth,
@@ -69,17 +76,10 @@ class RockContact:
             spin,
             spin_compliance,
             turn,
-            rho,
-            ref,
-            self._height,
-            self._slope,
+            turn_compliance / spin_compliance,
             self.spin,
-            self._work,
         )
-        self._torque = found[1]
         return found[0], found[1]
-
-    _torque = 0.0
 
     def commit(self, turn: float, depth: float, step: float, speed0: float, speed1: float, spin: float) -> None:
         """The bit has turned by ``turn`` (rad) and gone to ``depth`` (m) in a step (s) with these axial speeds (m/s)."""
@@ -94,21 +94,20 @@ class RockContact:
         return self.surface.depth_of_cut(self.depth)
 
     @property
-    def removed(self) -> float:
-        """Rock cut so far: integral of the depth of cut over the turn (m rad)."""
-        return self.surface.removed
+    def volume(self) -> float:
+        """Volume of rock cut so far (m3)."""
+        return self.surface.removed * self.law.radius**2 / 2
 
     def picture(self) -> dict[str, Array]:
-        """Surface around the bit for pictures: angle (rad) and height (m) below the start, all sectors in turn."""
-        return {}
+        """Surface behind the blades for pictures: ``rock_angle`` (rad, from a blade backwards) and ``rock_height`` (m)."""
+        return rock_picture(self.surface)
 
     def save(self) -> dict[str, Any]:
         """State for a checkpoint."""
-        return {**self.surface.state_dict(), "spin": self.spin, "depth": self.depth, "last_torque": self._torque}
+        return {**self.surface.state_dict(), "spin": self.spin, "depth": self.depth}
 
     def load(self, state: dict[str, Any]) -> None:
         """Restore a state of :meth:`save`."""
         state = dict(state)
         self.spin, self.depth = float(state.pop("spin")), float(state.pop("depth"))
-        self._torque = float(state.pop("last_torque"))
         self.surface.load(state)

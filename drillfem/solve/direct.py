@@ -29,7 +29,7 @@ DRILLING = {
     "bit_torque": "N m",
     "bit_weight": "N",
     "depth_of_cut": "m",
-    "rock_removed": "m",
+    "rock_volume": "m^3",
 }
 COMMON = {
     "top_torque": "N m",
@@ -96,9 +96,9 @@ class DirectRun:
         return {
             "work_top_drive": rod.top_torque() * spin,
             "work_gravity": -p["gravity"],
-            "work_hook": rod.end_power(),
+            "work_hook_load": rod.end_power(),
             "work_bit": bit,
-            "work_damping": p["damping"],
+            "dissipated": p["damping"],
             "work_wall": p.get("wall", 0.0),
         }
 
@@ -145,7 +145,7 @@ class DirectRun:
                 "bit_torque": float(rod.bit_load[1]),
                 "bit_weight": float(rod.bit_load[0]),
                 "depth_of_cut": self.rock.depth_of_cut(),
-                "rock_removed": self.rock.removed,
+                "rock_volume": self.rock.volume,
             }
         r, _ = rod.shape()
         return out | dict(zip(TIP, r[-1].tolist(), strict=True))
@@ -153,8 +153,7 @@ class DirectRun:
     def fields(self) -> dict[str, Array]:
         """Fields along the string at the present state."""
         self.rod.set_state(self.stepper.u, self.rod.u_dot.x.array)
-        out = self.rod.fields() | {"s": self.rod.arc_length}
-        return out | (self.rock.picture() if self.rock is not None else {})
+        return self.rod.fields() | (self.rock.picture() if self.rock is not None else {})
 
     # -- save and load -------------------------------------------------------------------------------------------------
 
@@ -240,6 +239,7 @@ def run_dynamic(scene: Any, writer_of: Callable[..., ResultWriter], until: float
             elif until > start:
                 writer.append(t, run.row(t))
                 writer.field(t, run.fields())
+                writer.checkpoint(t, run.save())
             run.stepper.restart()
             rows, pictures = grid(start, out.interval, t), grid(start, out.fields_interval, t)
             saves = grid(start, out.checkpoint_interval, t)
@@ -284,7 +284,7 @@ def run_static(scene: Any, writer_of: Callable[..., ResultWriter], progress: Obs
         r, _ = rod.shape()
         zero = dict.fromkeys([*COMMON, *WORKS], 0.0)
         writer.append(factor, zero | {"strain_energy": rod.energies()[1]} | dict(zip(TIP, r[-1].tolist(), strict=True)))
-        writer.field(factor, rod.fields() | {"s": rod.arc_length})
+        writer.field(factor, rod.fields())
         if progress is not None:
             progress(factor)
 

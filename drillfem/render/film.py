@@ -1,0 +1,215 @@
+"""A short film of the rotation and the waves (or of the swing): string.gif."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from drillfem.render import style
+from drillfem.render.charts import finest_window
+from drillfem.render.poses import dress, draw_floor, find_view, stripe_towards, thickness, tip_way, tube_of
+from drillfem.render.story import Story
+from drillfem.render.straight import (
+    Brush,
+    bit_things,
+    close_up,
+    depth_ticks,
+    ground,
+    hole_radius,
+    marks,
+    place,
+    radii,
+    stretched_view,
+)
+from drillfem.render.studio import Camera, Studio
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.figure import Figure
+
+FRAMES = 72
+LONGEST = 2.4  # s of simulated time in the film of a string that turns
+MILLISECONDS = 60  # per frame
+
+
+def film(studio: Studio, story: Story, field: str | None, path: Path) -> Path:
+    """string.gif: the last stretch that was saved at the finest interval, or the whole swing."""
+    part = slice(0, len(story.times)) if story.sideways or story.still else finest_window(story.times, LONGEST)
+    chosen = list(range(len(story.times))[part])
+    if len(chosen) > FRAMES:
+        chosen = [chosen[round(k)] for k in np.linspace(0, len(chosen) - 1, FRAMES)]
+    scene = swing if story.sideways else turning
+    with style.page(760, 640) as figure:
+        draw = scene(studio, story, field, figure, chosen)
+        frames = [draw(i) for i in chosen]
+    save_gif(frames, path, story.still)
+    return path
+
+
+def save_gif(frames: list[np.ndarray], path: Path, once: bool) -> None:
+    """One palette for all frames, so that what rests does not flicker and compresses well."""
+    from PIL import Image
+
+    pictures = [Image.fromarray(f[..., :3]) for f in frames]
+    sample = [pictures[k] for k in sorted({0, len(pictures) // 3, 2 * len(pictures) // 3, len(pictures) - 1})]
+    wide = Image.new("RGB", (sum(p.width for p in sample), sample[0].height))
+    for k, picture in enumerate(sample):
+        wide.paste(picture, (k * picture.width, 0))
+    palette = wide.quantize(96, method=Image.Quantize.MEDIANCUT)
+    small = [p.quantize(palette=palette, dither=Image.Dither.NONE) for p in pictures]
+    pause = 160 if once else MILLISECONDS
+    times = [pause] * len(small)
+    times[-1] = 900 if once else pause
+    small[0].save(path, save_all=True, append_images=small[1:], duration=times, loop=0, optimize=False)
+
+
+def _flow(figure: Figure, moving: list[Any]) -> Callable[[], np.ndarray]:
+    """Draw all that rests once; then only what moves."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = figure.canvas
+    assert isinstance(canvas, FigureCanvasAgg)
+    for artist in moving:
+        artist.set_animated(True)
+    canvas.draw()
+    still = canvas.copy_from_bbox(figure.bbox)
+
+    def frame() -> np.ndarray:
+        canvas.restore_region(still)
+        for artist in moving:
+            (artist.axes or figure).draw_artist(artist)
+        return np.array(canvas.buffer_rgba())
+
+    return frame
+
+
+def turning(
+    studio: Studio, story: Story, field: str | None, figure: Figure, chosen: list[int]
+) -> Callable[[int], np.ndarray]:
+    """The stretched string, its field against depth, and the bit on its rock."""
+    brush = Brush(story, field)
+    pose = story.pose(chosen[0])
+    top, bottom = float(pose.position[0, 2]), float(pose.position[-1, 2])
+    low, high = top - 0.055 * (bottom - top), bottom + 0.035 * (bottom - top)
+    hole = hole_radius(story)
+    half = 2.3 * hole
+    figure.text(0.02, 0.967, story.title, fontsize=14, weight="bold", va="center")
+    clock = figure.text(0.02, 0.928, "", fontsize=11, color=style.GREY, va="center")
+    y, h, w = 84, 476, 130
+    axes = place(figure, 66, y, w, h)
+    axes.grid(False)
+    ground(axes, half, hole, top, bottom, low, high)
+    blank = np.zeros((2, 2, 4), np.uint8)
+    tube = axes.imshow(blank, extent=(-half, half, high, low), aspect="auto", zorder=3)
+    axes.set_xlim(-half, half)
+    axes.set_ylim(high, low)
+    axes.set_xticks([])
+    axes.set_yticks(depth_ticks(top, bottom))
+    axes.set_ylabel("depth (m)")
+    moving: list[Any] = [tube, clock]
+    depth = pose.position[:, 2]
+    line = dot = None
+    if brush.field is not None:
+        chart = place(figure, 222, y, 190, h, sharey=axes)
+        everything = story.values(brush.field)[chosen]
+        chart.fill_betweenx(depth, everything.min(axis=0), everything.max(axis=0), color=style.FAINT, alpha=0.55, lw=0)
+        (line,) = chart.plot([], [], color=style.INK, lw=2.2)
+        (dot,) = chart.plot([], [], "o", color=style.VERMILION, ms=7)
+        lo, hi = float(everything.min()), float(everything.max())
+        room = 0.08 * (hi - lo) or 1.0
+        chart.set_xlim(lo - room, hi + room)
+        chart.tick_params(labelleft=False, labelbottom=False)
+        chart.set_title(story.label(brush.field), fontsize=11)
+        marks(chart, story, depth)
+        bar = place(figure, 222, y + h + 6, 190, 12)
+        lo, hi = chart.get_xlim()
+        bar.imshow(brush.cmap(brush.norm(np.linspace(lo, hi, 256)))[None], extent=(lo, hi, 0, 1), aspect="auto")
+        bar.set_yticks([])
+        bar.grid(False)
+        bar.set_xlim(lo, hi)
+        moving += [line, dot]
+    axes.set_ylim(high, low)
+    view = place(figure, 436, y, 300, h)
+    style.panel(view)
+    view.set_facecolor("#eef1f4")
+    close = view.imshow(blank, extent=(0, 1, 0, 1), aspect="auto")
+    moving.append(close)
+    with_bit = story.drilling and story.bit_radius > 0
+    scale: float | None = None
+    if with_bit:
+        from drillfem.render.straight import depth_of_bit, magnification
+
+        steps = []
+        for i in chosen:
+            rock = story.rock(i)
+            if rock is not None:
+                steps.append(float(np.ptp(rock[1] - depth_of_bit(story, i, rock[1]))))
+        scale = magnification(max(steps), story.bit_radius) if steps else None
+    view.set_title("Bit on the rock" + (f", cuts \u00d7{scale:g}" if scale else "") if with_bit else "Lower end", fontsize=11)
+    frame = _flow(figure, moving)
+
+    def draw(i: int) -> np.ndarray:
+        now = story.pose(i)
+        tube.set_data(stretched_view(studio, story, brush, i, w, h, low, high, half))
+        if line is not None and dot is not None and brush.field is not None:
+            values = brush.nodes(i)
+            line.set_data(values, depth)
+            dot.set_data(values[-1:], depth[-1:])
+        if with_bit:
+            a = story.bit_radius
+            things, _ = bit_things(story, brush, i, now, scale)
+            camera = Camera((0.0, 11.5 * a, -5.4 * a), (0.0, 0.0, -1.6 * a), angle=28.0)
+        else:
+            wide, s = radii(story), float(story.arc[-1])
+            reach = min(14 * wide, story.length)
+            things = close_up(story, brush, i, now, s - reach, s, float(now.position[-1, 2]))
+            camera = Camera((0.0, 30 * wide, -8 * wide), (0.0, 0.0, -4 * wide))
+        close.set_data(studio.shoot(things, camera, 300, h))
+        clock.set_text(f"{story.clock(now.time)}   \u00b7   {MILLISECONDS:g} ms shown per frame, {_pace(story, chosen)}")
+        return frame()
+
+    return draw
+
+
+def _pace(story: Story, chosen: list[int]) -> str:
+    """How much slower than life the film runs."""
+    if len(chosen) < 2:
+        return "one pose"
+    step = float(np.median(np.diff(story.times[chosen])))
+    pace = 1e-3 * MILLISECONDS / step
+    if pace > 1.05:
+        return f"{style.number(pace, 2)} times slower than life"
+    return "as fast as life" if pace > 0.95 else f"one pose every {style.number(step)} s: the turning between is not seen"
+
+
+def swing(
+    studio: Studio, story: Story, field: str | None, figure: Figure, chosen: list[int]
+) -> Callable[[int], np.ndarray]:
+    """The string in its plane or in space, the way of its tip behind it."""
+    first = story.pose(chosen[-1])
+    w, tallest = 650, 470
+    view, h = find_view(story, w, tallest, 0.09 * story.length)
+    brush = Brush(story, field, stripe_towards(first, view))
+    thick = thickness(story, view, h, least=7.0)
+    figure.text(0.02, 0.967, story.title, fontsize=14, weight="bold", va="center")
+    clock = figure.text(0.02, 0.928, "", fontsize=11, color=style.GREY, va="center")
+    axes = place(figure, 84, 84, w, h)
+    if view.floor is not None:
+        draw_floor(axes, story, view, view.floor, first, [])
+    tip_way(axes, story, view)
+    picture = axes.imshow(np.zeros((2, 2, 4), np.uint8), extent=view.extent, zorder=5)
+    dress(axes, view)
+    frame = _flow(figure, [picture, clock])
+
+    def draw(i: int) -> np.ndarray:
+        texture = brush.texture(i, float(story.arc[0]), float(story.arc[-1]))
+        things = tube_of(story, story.pose(i), thick, texture, (0, 0, 0))
+        picture.set_data(studio.shoot(things, view.camera(), w, h))
+        colour = f"   \u00b7   colour: {story.label(brush.field)}" if brush.field else ""
+        clock.set_text(story.clock(float(story.times[i])) + colour)
+        return frame()
+
+    return draw

@@ -1,0 +1,154 @@
+"""Runs of a straight drilling string through the condensed engine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..bitrock.law import BitLaw
+from ..bitrock.surface import RockSurface
+from ..compat import Array
+from ..errors import SceneError
+from ..models.initial import initial_state
+from ..models.rod import Rod
+from ..models.straight import matrices
+from ..results import Result, ResultWriter
+from ..scene import Scene
+from .audit import EnergyAudit
+from .condensed import Channel, CondensedString
+from .contact import rock_picture, surface_of
+from .direct import variables
+
+#: The chunk between two looks at the clock (s of wall time, roughly) and its size at the start (steps).
+_CHUNK_SECONDS, _FIRST_CHUNK = 0.25, 200
+
+
+class StraightRun:
+    """A scene's string in the condensed engine, with the fields and the history of a rod."""
+
+    def __init__(self, scene: Scene) -> None:
+        rod = self.rod = Rod(scene)
+        if rod.model != "axial-torsional" or not rod.has_bit:
+            raise SceneError(f"time.engine = 'condensed': is for a straight drilling string, not for model {rod.model}")
+        u0 = initial_state(rod)
+        axial, torsional = matrices(rod)
+        last = len(rod.nodes) - 1
+        weight = -rod.gravity_vector().reshape(-1, rod.ansatz.size)[rod.nodes, rod.ansatz.index("v3")]
+        drive = scene.top_drive
+
+        def top(times: Array) -> tuple[Array, Array]:
+            motions = [drive.motion(float(t)) for t in times + scene.time.start]
+            return np.array([m[0] for m in motions]), np.array([m[1] for m in motions])
+
+        self.string = CondensedString(
+            Channel(axial.mass, axial.damping, axial.stiffness, last, 0, weight),
+            Channel(torsional.mass, torsional.damping, torsional.stiffness, last, 0),
+            BitLaw.from_scene(scene),
+            surface_of(scene),
+            scene.time.step,
+            hook_load=scene.nominal().hook_load,
+            top=(drive.speed or 0.0) if drive.kind == "imposed-speed" else top,
+        )
+        block = u0.reshape(-1, rod.ansatz.size)[rod.nodes]
+        z, phi, v, w = (block[:, rod.ansatz.index(name)] for name in ("r3", "phi", "v3", "w3"))
+        self.string.reset(z - rod.arc_length, v, phi, w)
+        first = self.string.sample()
+        # the bit's angle counts from the start, and its twist there is part of the state
+        self.angle_start = first["bit_angle"]
+        self.stored_at_start = first["kinetic_energy"] + first["strain_energy"]
+        self.scale = 0.0
+
+    @property
+    def surface(self) -> RockSurface:
+        """The rock."""
+        return self.string.surface
+
+    def history(self, rows: dict[str, Any]) -> tuple[Array, dict[str, Array]]:
+        """Times (n,) and history arrays (n,) from the engine's rows; updates the error of the energy balance."""
+        rows = {name: np.atleast_1d(values) for name, values in rows.items()}
+        rows["bit_angle"] = rows["bit_angle"] - self.angle_start
+        rows["work_bit"] = rows["work_cutting"] + rows["work_wear_flat"]
+        rows["work_wall"] = np.zeros_like(rows["time"])
+        stored = rows["kinetic_energy"] + rows["strain_energy"]
+        audit = EnergyAudit(self.stored_at_start, 0.0, {}, scale=self.scale)
+        for i in range(len(stored)):
+            audit.works = {name: float(rows[name][i]) for name in audit.works}
+            self.energy_error = audit.error(float(stored[i]))
+        self.scale = audit.scale
+        return rows["time"] + self.rod.scene.time.start, {name: rows[name] for name in variables(True)}
+
+    energy_error = 0.0
+
+    def fields(self) -> dict[str, Array]:
+        """Fields along the string now."""
+        rod, now = self.rod, self.string.fields()
+        u = np.zeros((len(rod.nodes), rod.ansatz.size))
+        values = {
+            "r3": rod.arc_length + now["displacement"],
+            "phi": now["angle"],
+            "v3": now["axial_speed"],
+            "w3": now["angular_speed"],
+        }
+        for name, value in values.items():
+            u[rod.nodes, rod.ansatz.index(name)] = value
+        rod.set_state(u.reshape(-1), np.zeros(rod.size))
+        return rod.fields() | rock_picture(self.surface)
+
+    def save(self) -> dict[str, Any]:
+        """State for a checkpoint."""
+        return {"string": self.string.state_dict(), "scale": self.scale}
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Continue from a saved state."""
+        self.string.load(state["string"])
+        self.scale = float(state["scale"])
+
+
+def run_condensed(
+    scene: Scene, writer_of: Callable[..., ResultWriter], until: float, progress: Callable[[float], None]
+) -> Result:
+    """March a scene to ``until``, writing as it goes."""
+    run = StraightRun(scene)
+    writer = writer_of(run.rod.model, run.rod.size, variables(True))
+    string, start, step = run.string, scene.time.start, scene.time.step
+    end = round((until - start) / step)
+    every = round(scene.output.interval / step)
+    pictures = max(every, round(scene.output.fields_interval / step))
+    saves = max(1, round(scene.output.checkpoint_interval / step))
+
+    def report() -> dict[str, Any]:
+        return {"steps": string.count, "energy_balance_error": run.energy_error, **string.counters}
+
+    import time
+
+    with writer:
+        if writer.restart is not None:
+            run.load(writer.restart[1])
+        else:
+            times, rows = run.history(string.sample())
+            writer.append_block(times, rows)
+            writer.field(start, run.fields())
+            writer.checkpoint(start, run.save())
+        chunk = _FIRST_CHUNK
+        while string.count < end:
+            # chunks end at whatever comes first: a picture, a checkpoint, or the patience of the user
+            stops = [end, string.count + chunk]
+            stops += [(string.count // n + 1) * n for n in (pictures, saves)]
+            stop = min(stops)
+            began = time.perf_counter()
+            rows = string.advance(stop - string.count, every)
+            pace = (time.perf_counter() - began) / max(1, len(rows["time"])) / every
+            chunk = max(_FIRST_CHUNK, math.floor(_CHUNK_SECONDS / max(pace, 1e-9)))
+            t = start + string.time
+            if len(rows["time"]):
+                writer.append_block(*run.history(rows))
+            writer.update(**report())
+            if string.count % pictures == 0:
+                writer.field(t, run.fields())
+            if string.count % saves == 0:
+                writer.checkpoint(t, run.save())
+            progress(t)
+        return writer.finish({**report(), "converged": True})
