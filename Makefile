@@ -1,15 +1,13 @@
 # RUN= (empty) runs a target in the current environment, as the image does.
 RUN ?= ./run
 OUT ?= results
-SCENE ?= vertical-c1-cd4
 ARGS ?=
 IMAGE ?= drillfem
 
 .PHONY: demo test lint verify image
 
-demo: ## the main job: a 1200 m string drills rock; numbers, pictures and a table in $(OUT)/$(SCENE)
-	$(RUN) drillfem run $(SCENE) --out $(OUT)/$(SCENE)
-	$(RUN) drillfem render $(OUT)/$(SCENE)
+demo: ## the main job: a 1200 m string drills rock; history, pictures and a table in $(OUT)/demo
+	$(RUN) drillfem demo --out $(OUT)/demo
 
 test: ## the fast tests; ARGS="-k bit -x" goes to pytest
 	$(RUN) pytest $(ARGS)

@@ -95,6 +95,18 @@ def _announced() -> Iterator[None]:
         ffcx.propagate = propagate
 
 
+def _name_rules_by_more_digits() -> None:
+    """FFCx names quadrature rules in its C code by three hexadecimal digits: two of ours for P4 share them (dc7)."""
+    with contextlib.suppress(ImportError, AttributeError):
+        from ffcx.ir.representationutils import QuadratureRule
+
+        short = QuadratureRule.id
+        QuadratureRule.id = lambda rule: rule.hash_obj.hexdigest()[-12:] if hasattr(rule, "hash_obj") else short(rule)
+
+
+_name_rules_by_more_digits()
+
+
 def compile_form(form: ufl.Form) -> dolfinx.fem.Form:
     """Compile a form; the first time ever on a machine this takes seconds and says so."""
     with _announced():

@@ -39,12 +39,20 @@ class Measures:
 
 @dataclass(frozen=True)
 class EndLoad:
-    """Load on an end: force (3, N) and moment (3, N m), spatial components; attached mass (kg) and inertia (kg m2)."""
+    """Load on an end: force (3, N) and moment (3, N m), spatial components; what is attached there.
+
+    ``mass`` (kg) and rotary ``inertia`` about the string's axis (kg m2).
+    """
 
     force: Expr
     moment: Expr
     mass: Expr
     inertia: Expr
+
+    @property
+    def Theta(self) -> Expr:
+        """Moments of inertia of what is attached (3x3, kg m2)."""
+        return ufl.diag(ufl.as_vector((0, 0, self.inertia)))
 
 
 @dataclass(frozen=True)
@@ -64,10 +72,14 @@ class Wall:
     projected: bool = True
 
 
+def spin_rate(Theta: Expr, twist: Twist, rate: Twist) -> Expr:
+    """Rate of the angular momentum in material components, Theta w-dot + w x Theta w (2-61); Theta is 3x3."""
+    return Theta * rate.w + ufl.cross(twist.w, Theta * twist.w)
+
+
 def inertia(twist: Twist, rate: Twist, virtual: Twist, section: Section) -> Expr:
     """rho A v-dot . dr + (Theta w-dot + w x Theta w) . dtheta (2-51), (2-61), per length."""
-    spin = section.Theta * rate.w + ufl.cross(twist.w, section.Theta * twist.w)
-    return section["mass"] * ufl.dot(rate.v, virtual.v) + ufl.dot(spin, virtual.w)
+    return section["mass"] * ufl.dot(rate.v, virtual.v) + ufl.dot(spin_rate(section.Theta, twist, rate), virtual.w)
 
 
 def _radial(x: Configuration) -> tuple[Expr, Expr]:
@@ -114,7 +126,8 @@ def friction(x: Configuration, twist: Twist, virtual: Twist, section: Section, w
 def end_load(x: Configuration, twist: Twist, rate: Twist, virtual: Twist, load: EndLoad) -> Expr:
     """Virtual work at an end: applied load and the inertia of what is attached there."""
     applied = ufl.dot(load.force, virtual.v) + ufl.dot(load.moment, x.R * virtual.w)
-    return load.mass * ufl.dot(rate.v, virtual.v) + load.inertia * ufl.dot(rate.w, virtual.w) - applied
+    turning = ufl.dot(spin_rate(load.Theta, twist, rate), virtual.w)
+    return load.mass * ufl.dot(rate.v, virtual.v) + turning - applied
 
 
 def bit_load(x: Configuration, virtual: Twist, tangent: Expr, weight: Expr, torque: Expr) -> Expr:
@@ -209,8 +222,9 @@ def static_terms(
 ) -> Terms:
     """Equilibrium in the configuration fields alone; x, test of shape (len(a.x_names),).
 
-    The ansatz' constraint (|q| = 1) closes the system, weighted by the mean bending stiffness so that its rows have
-    the size of the others.
+    The ansatz' constraint (|q| = 1) closes the system. It stiffens the one direction that no virtual rotation spans, and
+    must outweigh the strain energy of an element of size h: between nodes of unequal |q| the interpolated rotation swerves,
+    and a weight that does not grow with 1/h2 leaves the nodes free to do so.
     """
     at = a.configuration(x, s)
     still = Twist(0 * at.r, 0 * at.u_m)
@@ -221,7 +235,8 @@ def static_terms(
         # dg . test / 2 = q . dq: the direction that no virtual rotation spans
         q, dq = x, test
         along = sum(q[i] * dq[i] for i in range(3, 7))
-        terms["constraint"] = section["torsion"] * g * along * on.nodal
+        h = ufl.CellVolume(ufl.domain.extract_unique_domain(test))
+        terms["constraint"] = 1e4 * section["torsion"] / h**2 * g * along * on.nodal
     return terms
 
 
@@ -232,7 +247,7 @@ def kinetic_energy(a: Ansatz, u: Expr, s: Expr, section: Section, loads: Loads, 
     t = a.twist(v, at)
 
     def at_end(load: EndLoad) -> Expr:
-        return (load.mass * ufl.dot(t.v, t.v) + load.inertia * ufl.dot(t.w, t.w)) / 2
+        return (load.mass * ufl.dot(t.v, t.v) + ufl.dot(t.w, load.Theta * t.w)) / 2
 
     density = section["mass"] * ufl.dot(t.v, t.v) + ufl.dot(t.w, section.Theta * t.w)
     return density / 2 * on.mass + at_end(loads.top) * on.top + at_end(loads.bottom) * on.bottom

@@ -121,17 +121,25 @@ def quaternions(R: Array) -> Array:
 
 
 # -- statics ----------------------------------------------------------------------------------------------------------
-def equilibrium(rod: Rod, factors: Sequence[float] = (1.0,), x0: Array | None = None) -> Equilibrium:
-    """Scale the scene's tip loads through ``factors``; the result stays in ``rod.u`` (at rest)."""
-    problem = Statics(rod)
+def equilibrium(
+    rod: Rod,
+    factors: Sequence[float] | Array = (1.0,),
+    load: Callable[[float], None] | None = None,
+    on_step: Callable[[float, Array], None] | None = None,
+    start: Array | None = None,
+) -> Equilibrium:
+    """Follow ``load`` (default: the scene's tip loads) through ``factors``; the result stays in ``rod.u``, at rest."""
     force, moment = rod.tip_force.value.copy(), rod.tip_moment.value.copy()
 
-    def load(factor: float) -> None:
+    def proportional(factor: float) -> None:
         rod.tip_force.value, rod.tip_moment.value = factor * force, factor * moment
 
-    start = problem.start(initial_state(rod)) if x0 is None else x0
-    result = problem.solve(start, np.asarray(factors), load)
-    load(1.0)
+    problem = Statics(rod)
+    first = initial_state(rod) if start is None else start
+    try:
+        result = problem.solve(problem.start(first), np.asarray(factors), load or proportional, on_step)
+    finally:
+        proportional(1.0)
     state = np.zeros((len(rod.nodes), rod.ansatz.size))
     state[:, : len(rod.ansatz.x_names)] = result.x
     rod.set_state(state.reshape(-1), np.zeros(rod.size))

@@ -64,16 +64,18 @@ def dg_operators(degree: int, elements: int, width: float) -> DGOperators:
 
 
 class DGData(NamedTuple):
-    """Operators of a sector of unit width for both directions (index 0 forwards, 1 backwards), rows compressed."""
+    """Operators of a sector of unit width for both directions (index 0 forwards, 1 backwards)."""
 
-    start: I8  # (2, n + 1)
-    column: I8  # (2, nonzeros)
-    value: F8  # (2, nonzeros)
+    column: I8  # (2, k, n): the k-th nonzero of each row, padded with zeros; rows side by side for SIMD
+    value: F8  # (2, k, n)
     source: F8  # (2, n): response of dL/dphi to the inflow
-    end: F8  # (2, n): height where the rock leaves (row 0: right end) when turning that way
+    end_column: I8  # (2, e)
+    end: F8  # (2, e): height where the rock leaves (row 0: right end) when turning that way
     mean: F8  # (n,): integral of the height over the unit sector
-    taylor_column: I8  # (2, k): degrees of freedom that reach the outflow within one Runge-Kutta step
-    taylor: F8  # (2, 5, k): derivatives of the outflow height with respect to the turn
+    column_ahead: I8  # (2, n): degrees of freedom in the order in which they reach the outflow
+    reach: I8  # (2, 5): how many of them do within 0 ... 4 Runge-Kutta steps
+    derivative: F8  # (2, 17, n): derivatives of the outflow height with respect to the turn, in that order
+    series: F8  # (5, 17): coefficients of (1 + z + z^2/2 + z^3/6 + z^4/24)^steps
     limit: float  # longest stable turn, in sectors
     height: F8  # (m, n): the state
     scratch: F8  # (5, m, n)
@@ -87,21 +89,23 @@ def dg_setup(op: DGOperators, sectors: int) -> DGData:
     rates = [inverse @ op.forward, inverse @ op.backward]
     rates = [np.where(np.abs(a) < 1e-13 * scale, 0.0, a) for a in rates]
     inflow, end = np.stack([op.left, op.right]), np.stack([op.right, op.left])
-    starts, columns, values, powers = [], [], [], []
-    for a, e in zip(rates, end, strict=True):
-        rows, cols = np.nonzero(a)
-        starts.append(np.searchsorted(rows, np.arange(n + 1)))
-        columns.append(cols)
-        values.append(a[rows, cols])
-        powers.append(np.stack([e @ np.linalg.matrix_power(a, k) for k in range(5)]))
-    longest = max(len(c) for c in columns)
-    used = [np.nonzero(np.any(p != 0, axis=0))[0] for p in powers]
-    widest = max(len(u) for u in used)
+    longest = max(1, max(int(np.count_nonzero(a, axis=1).max()) for a in rates))
+    column = np.stack([np.argsort(a == 0, axis=1, kind="stable")[:, :longest].T for a in rates])
+    value = np.stack([a[np.arange(n), c] for a, c in zip(rates, column, strict=True)])
+    power, orders, reach = np.empty((2, 17, n)), [], np.empty((2, 5), np.int64)
     for i in range(2):
-        columns[i] = np.pad(columns[i], (0, longest - len(columns[i])))
-        values[i] = np.pad(values[i], (0, longest - len(values[i])))
-        spare = np.setdiff1d(np.arange(n), used[i])[: widest - len(used[i])]
-        used[i] = np.concatenate([used[i], spare])
+        power[i, 0] = end[i]
+        for k in range(16):
+            power[i, k + 1] = power[i, k] @ rates[i]
+        first = np.where(power[i].any(axis=0), np.argmax(power[i] != 0, axis=0), 17)
+        orders.append(np.argsort(first, kind="stable"))
+        reach[i] = [np.count_nonzero(first <= 4 * steps) for steps in range(5)]
+    series = np.zeros((5, 17))
+    series[0, 0] = 1.0
+    for steps in range(4):
+        series[steps + 1] = np.convolve(series[steps], [1, 1, 1 / 2, 1 / 6, 1 / 24])[:17]
+    edge = max(int(np.count_nonzero(e)) for e in end)
+    end_column = np.argsort(end == 0, axis=1, kind="stable")[:, :edge]
     # closed to a ring the operator is (nearly) normal, so its spectrum gives the stable step of the Runge-Kutta scheme
     ring = np.linalg.eigvals(rates[0] + np.outer(inverse @ op.left, op.right))
     lo, hi = 0.0, 4.0 / max(np.abs(ring).max(), 1.0)
@@ -110,14 +114,16 @@ def dg_setup(op: DGOperators, sectors: int) -> DGData:
         growth = np.abs(1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))).max()
         lo, hi = (0.5 * (lo + hi), hi) if growth <= 1 + 1e-10 else (lo, 0.5 * (lo + hi))
     return DGData(
-        start=np.stack(starts).astype(np.int64),
-        column=np.stack(columns).astype(np.int64),
-        value=np.stack(values),
+        column=column.astype(np.int64),
+        value=value,
         source=np.stack([inverse @ f for f in inflow]),
-        end=end,
+        end_column=end_column.astype(np.int64),
+        end=np.take_along_axis(end, end_column, axis=1),
         mean=np.ones(n) @ op.mass / op.width,
-        taylor_column=np.stack(used).astype(np.int64),
-        taylor=np.stack([p[:, u] for p, u in zip(powers, used, strict=True)]),
+        column_ahead=np.stack(orders).astype(np.int64),
+        reach=reach,
+        derivative=np.stack([p[:, o] for p, o in zip(power, orders, strict=True)]),
+        series=series,
         limit=0.95 * lo,
         height=np.zeros((sectors, n)),
         scratch=np.zeros((5, sectors, n)),
@@ -125,21 +131,26 @@ def dg_setup(op: DGOperators, sectors: int) -> DGData:
 
 
 @njit(cache=True)
-def _end_height(dg: DGData, side: int, height: F8) -> float:
-    """Height where the rock leaves the sector (Taylor term 0 covers every nonzero of the end functional)."""
+def _end_height(column: I8, value: F8, height: F8) -> float:
+    """Height where the rock leaves the sector."""
     total = 0.0
-    for k in range(dg.taylor_column.shape[1]):
-        total += dg.taylor[side, 0, k] * height[dg.taylor_column[side, k]]
+    for k in range(value.size):
+        total += value[k] * height[column[k]]
     return total
 
 
-@njit(cache=True)
-def _rate(dg: DGData, side: int, height: F8, inflow: float, scale: float, out: F8) -> None:
-    for i in range(height.size):
-        total = dg.source[side, i] * inflow
-        for k in range(dg.start[side, i], dg.start[side, i + 1]):
-            total += dg.value[side, k] * height[dg.column[side, k]]
-        out[i] = scale * total
+@njit(cache=True, fastmath={"contract"})
+def _rate(column: I8, value: F8, source: F8, height: F8, inflow: float, scale: float, out: F8) -> None:
+    """d height / d turn of one sector: row-wise sparse product, all rows side by side."""
+    n = height.size
+    for i in range(n):
+        out[i] = source[i] * inflow
+    for k in range(column.shape[0]):
+        c, a = column[k], value[k]
+        for i in range(n):
+            out[i] += a[i] * height[c[i]]
+    for i in range(n):
+        out[i] *= scale
 
 
 @njit(cache=True)
@@ -149,26 +160,25 @@ def _cut(u0: float, u1: float, s0: float, s1: float, x: float) -> float:
     return u0 * y * y * (1.0 + 2.0 * x) + u1 * x * x * (3.0 - 2.0 * x) + x * y * (s0 * y - s1 * x)
 
 
-@njit(cache=True)
-def _inflow(
-    dg: DGData, side: int, heights: F8, blade: int, u: float
-) -> tuple[float, float]:
-    """What enters sector ``blade`` now, and what leaves the sector that the blade works on."""
-    m = heights.shape[0]
-    if side == 0:
-        out = _end_height(dg, 0, heights[(blade + 1) % m])
-        return max(u, out), out
-    out = _end_height(dg, 1, heights[(blade - 1) % m])
-    return out, out
-
-
-@njit(cache=True)
+@njit(cache=True, fastmath={"contract"})
 def _advance(
-    dg: DGData, width: F8, share: F8, state: F8, stage: F8, total: F8, rate: F8, turn: float, u0: float, u1: float, s0: float, s1: float
+    dg: DGData,
+    width: F8,
+    share: F8,
+    state: F8,
+    scratch: F8,
+    turn: float,
+    u0: float,
+    u1: float,
+    s0: float,
+    s1: float,
 ) -> float:
     """Runge-Kutta steps of ``state`` over a turn of either sign.  Returns the rock removed, m rad over all blades."""
     m = width.size
     side = 0 if turn >= 0.0 else 1
+    stage, total, rate = scratch[0], scratch[1], scratch[2]
+    column, value, source = dg.column[side], dg.value[side], dg.source[side]
+    end_column, end = dg.end_column[side], dg.end[side]
     substeps = max(1, int(np.ceil(abs(turn) / (dg.limit * width.min()))))
     step = abs(turn) / substeps
     removed = 0.0
@@ -177,17 +187,27 @@ def _advance(
             lead = 0.0 if part == 0 else (1.0 if part == 3 else 0.5)
             weight = step / 6.0 if part == 0 or part == 3 else step / 3.0
             u = _cut(u0, u1, s0, s1, (sub + lead) / substeps)
-            source = state if part == 0 else stage
+            at = state if part == 0 else stage
             for b in range(m):
-                entering, leaving = _inflow(dg, side, source, b, u)
+                # forwards blade b meets what leaves the sector ahead of it; backwards the rock just returns
+                leaving = _end_height(end_column, end, at[(b + 1) % m if side == 0 else (b - 1) % m])
+                entering = max(u, leaving) if side == 0 else leaving
                 removed += share[b] * weight * (entering - leaving)
-                _rate(dg, side, source[b], entering, 1.0 / width[b], rate[b])
-            ahead = 0.5 * step if part < 2 else step
+                _rate(column, value, source, at[b], entering, 1.0 / width[b], rate[b])
+            lead = 0.5 * step if part < 2 else step
             for b in range(m):
-                for i in range(state.shape[1]):
-                    total[b, i] = (state[b, i] if part == 0 else total[b, i]) + weight * rate[b, i]
-                    stage[b, i] = state[b, i] + ahead * rate[b, i]
-        state[:] = total
+                base, slope, new, next_at = state[b], rate[b], total[b], stage[b]
+                if part == 0:
+                    for i in range(base.size):
+                        new[i] = base[i] + weight * slope[i]
+                        next_at[i] = base[i] + lead * slope[i]
+                elif part < 3:
+                    for i in range(base.size):
+                        new[i] += weight * slope[i]
+                        next_at[i] = base[i] + lead * slope[i]
+                else:
+                    for i in range(base.size):
+                        base[i] = new[i] + weight * slope[i]
     return removed
 
 
@@ -196,38 +216,39 @@ def dg_commit(dg: DGData, width: F8, share: F8, turn: float, u0: float, u1: floa
     """Turn the bit; returns the rock removed (m rad over all blades)."""
     if turn == 0.0:
         return 0.0
-    w = dg.scratch
-    return _advance(dg, width, share, dg.height, w[0], w[1], w[2], turn, u0, u1, s0 * turn, s1 * turn)
+    return _advance(dg, width, share, dg.height, dg.scratch, turn, u0, u1, s0 * turn, s1 * turn)
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
 def dg_ahead(dg: DGData, width: F8, turn: float, forward: bool, height: F8, slope: F8) -> None:
     """Height of the rock that each blade meets after ``turn``, and its slope in the turn."""
     m = width.size
     side = 0 if forward else 1
-    state = dg.height
-    x = abs(turn)
-    if x > dg.limit * width.min():
-        # beyond one Runge-Kutta step: turn a copy (what enters does not come out within a sector)
+    state, x = dg.height, abs(turn)
+    steps = max(1, int(np.ceil(x / (dg.limit * width.min()))))
+    if steps > 4 or (steps > 1 and dg.reach[side, steps] == state.shape[1]):
+        # what leaves now may depend on what enters: turn a copy (above the rock, so that nothing is cut)
         state = dg.scratch[3]
         state[:] = dg.height
-        w = dg.scratch
         deep = dg.height.min() - 1.0
-        _advance(dg, width, width, state, w[0], w[1], w[2], turn, deep, deep, 0.0, 0.0)
-        x = 0.0
+        _advance(dg, width, width, state, dg.scratch, turn, deep, deep, 0.0, 0.0)
+        steps, x = 1, 0.0
+    column, reach, series = dg.column_ahead[side], dg.reach[side, steps], dg.series[steps]
     for b in range(m):
-        source = (b + 1) % m if forward else b
         # backwards the rock that was behind blade b comes under it: the left end of its own sector
-        value = rate = 0.0
-        h = 1.0 / width[source]
-        term, before = 1.0, 0.0  # (h x)^k / k! and its derivative in x
-        for k in range(5):
-            derivative = 0.0
-            for j in range(dg.taylor_column.shape[1]):
-                derivative += dg.taylor[side, k, j] * state[source, dg.taylor_column[side, j]]
-            value += derivative * term
-            rate += derivative * before
-            before = term * h
-            term *= x * h / (k + 1.0)
+        height_of = state[(b + 1) % m if forward else b]
+        h = 1.0 / width[(b + 1) % m if forward else b]
+        # exactly what the Runge-Kutta steps will let out: a power of the stability polynomial, applied to the end functional
+        value = rate = before = 0.0
+        term = 1.0  # (h x / steps)^k, and its derivative in x
+        for k in range(4 * steps + 1):
+            row = dg.derivative[side, k]
+            total = 0.0
+            for j in range(reach):
+                total += row[j] * height_of[column[j]]
+            value += series[k] * total * term
+            rate += series[k] * total * before
+            before = (k + 1) * h / steps * term
+            term *= h * x / steps
         height[b] = value
         slope[b] = rate if forward else -rate

@@ -136,7 +136,7 @@ def _straighten(p: ProfileData, s: int, j: int, k: int) -> None:
 
 @njit(cache=True)
 def _push(
-    p: ProfileData, s: int, y0: float, m0: float, key: float, y1: float, m1: float, spacing: float, straight: bool
+    p: ProfileData, s: int, y0: float, m0: float, key: float, y1: float, m1: float, spacing: float
 ) -> float:
     """Append a piece that starts at the last knot with value y0, slope m0 and ends at (key, y1, m1); returns its integral."""
     n = p.key.shape[1]
@@ -151,11 +151,11 @@ def _push(
     p.after[s, j] = m0
     back = (j - 1) % n
     if p.count[s] > 2 and key - p.key[s, back] < spacing:
-        # the last knot is too close to the one before: one piece in place of two
+        # the last knot is too close to the one before: one straight piece in place of two (slopes over the tiny turns of
+        # a stalled bit are huge: a cubic would overshoot)
         change -= _knot_area(p, s, p.count[s] - 2)
         p.key[s, j], p.height[s, j], p.before[s, j], p.after[s, j] = key, y1, m1, m1
-        if straight:
-            _straighten(p, s, back, j)
+        _straighten(p, s, back, j)
         return change + _knot_area(p, s, p.count[s] - 2)
     k = (j + 1) % n
     p.key[s, k], p.height[s, k], p.before[s, k], p.after[s, k] = key, y1, m1, m1
@@ -169,7 +169,6 @@ def _turn_forward(
 ) -> float:
     m, n = width.size, p.key.shape[1]
     phi0 = p.phi[0]
-    straight = s0 == s1 and abs(s0 * (phi1 - phi0) - (u1 - u0)) <= 1e-12 * abs(u1 - u0)
     removed = 0.0
     for b in range(m):
         s = (b + 1) % m  # the sector whose rock meets blade b; what the blade leaves enters sector b
@@ -184,7 +183,7 @@ def _turn_forward(
         end, end_slope = _at(p, s, last - 1, phi1)
         gain = 0.0
         if cutting and u1 >= end:
-            gain += _push(p, b, u0, s0, phi1 + w, u1, s1, spacing, straight)
+            gain += _push(p, b, u0, s0, phi1 + w, u1, s1, spacing)
         else:
             # piece by piece between the knots met: the deeper of blade and rock, divided where they cross
             for i in range(last):
@@ -200,9 +199,9 @@ def _turn_forward(
                 a1, g1 = _piece(phi0, u0, s0, phi1, u1, s1, x1)
                 if (a0 >= r0) == (a1 >= r1):
                     if a0 >= r0:
-                        gain += _push(p, b, a0, g0, x1 + w, a1, g1, spacing, straight)
+                        gain += _push(p, b, a0, g0, x1 + w, a1, g1, spacing)
                     else:
-                        gain += _push(p, b, r0, t0, x1 + w, r1, t1, spacing, False)
+                        gain += _push(p, b, r0, t0, x1 + w, r1, t1, spacing)
                     continue
                 lo, hi = x0, x1
                 for _ in range(60):
@@ -217,11 +216,11 @@ def _turn_forward(
                 u, g = _piece(phi0, u0, s0, phi1, u1, s1, x)
                 r, t = _piece(x0, r0, t0, x1, r1, t1, x)
                 if a0 >= r0:
-                    gain += _push(p, b, a0, g0, x + w, u, g, spacing, False)
-                    gain += _push(p, b, u, t, x1 + w, r1, t1, spacing, False)
+                    gain += _push(p, b, a0, g0, x + w, u, g, spacing)
+                    gain += _push(p, b, u, t, x1 + w, r1, t1, spacing)
                 else:
-                    gain += _push(p, b, r0, t0, x + w, u, t, spacing, False)
-                    gain += _push(p, b, u, g, x1 + w, a1, g1, spacing, False)
+                    gain += _push(p, b, r0, t0, x + w, u, t, spacing)
+                    gain += _push(p, b, u, g, x1 + w, a1, g1, spacing)
         removed += share[b] * gain
     for s in range(m):  # what was met leaves the front
         while p.count[s] > 2 and p.key[s, (p.first[s] + 1) % n] <= phi1:

@@ -45,17 +45,17 @@ def spin_perturbation(scene: Scene) -> float:
 def initial_state(rod: Rod) -> Array:
     """Vector of unknowns at the start, shape (dofs,)."""
     scene, a, s = rod.scene, rod.ansatz, rod.arc_length
-    state = {name: np.zeros(len(s)) for name in a.x_names + a.v_names}
+    state: dict[str, Array] = {name: np.zeros(len(s)) for name in a.x_names + a.v_names}
     state |= {"r1": np.zeros(len(s)), "r2": np.zeros(len(s)), "r3": s.copy()}
-    bend = np.zeros(len(s))  # rotation about the axis that turns e3 into the bend
+    bend: Array = np.zeros(len(s))  # rotation about the axis that turns e3 into the bend
     reference = scene.reference
     b = np.asarray(reference.bend_towards)
-    if reference.shape == "arc":
+    if reference.radius is not None:
         bend = s / reference.radius
         offset = reference.radius * (1 - np.cos(bend))
         state["r1"], state["r2"] = offset * b[0], offset * b[1]
         state["r3"] = reference.radius * np.sin(bend)
-    turn = np.zeros(len(s))
+    turn: Array = np.zeros(len(s))
     if rod.has_bit:
         nominal = scene.nominal()
         f, psi = stretch_and_twist(scene, s)

@@ -296,7 +296,7 @@ class Rod:
 
     def reactions(self) -> dict[int, float]:
         """Reaction (N or N m) at every constrained dof, from the last residual."""
-        return dict(zip(self._constrained.tolist(), self.reaction.tolist(), strict=True))
+        return {int(dof): float(value) for dof, value in zip(self._constrained, self.reaction, strict=True)}
 
     def top_torque(self) -> float:
         """Torque of the drive on the string (N m) at the last residual."""
@@ -305,17 +305,24 @@ class Rod:
 
     def end_power(self) -> float:
         """Power (W) that the hook load and the loads at the tip put into the string at the present state."""
-        u, total = self.u.x.array, 0.0
-        for node, load in ((0, self.loads.top), (-1, self.loads.bottom)):
-            for k in range(3):
-                name = f"v{k + 1}"
-                if load.force.value[k] != 0.0 and name in self.ansatz.v_names:
-                    total += load.force.value[k] * u[self.dof(node, name)]
-            if np.any(load.moment.value):
-                _, R = self.shape()
-                w = np.array([u[self.dof(node, n)] if n in self.ansatz.v_names else 0.0 for n in ("w1", "w2", "w3")])
-                total += load.moment.value @ (R[node] @ w)
+        total = 0.0
+        for force, dof in self._end_forces:
+            total += force * self._u[dof]
+        if np.any(self.tip_moment.value):
+            names = self.ansatz.v_names
+            w = [self._u[self.dof(-1, n)] if n in names else 0.0 for n in ("w1", "w2", "w3")]
+            total += self.tip_moment.value @ (self.shape()[1][-1] @ w)
         return float(total)
+
+    @cached_property
+    def _end_forces(self) -> list[tuple[float, int]]:
+        """Constant forces at the ends, with the speed that each works on."""
+        found = []
+        for node, load in ((0, self.loads.top), (-1, self.loads.bottom)):
+            for k, name in enumerate(("v1", "v2", "v3")):
+                if load.force.value[k] != 0.0 and name in self.ansatz.v_names:
+                    found.append((float(load.force.value[k]), self.dof(node, name)))
+        return found
 
     # -- audits ------------------------------------------------------------------------------------------------------
 

@@ -1,6 +1,7 @@
-"""Pictures of a saved result: the string with its rotation, its history, spectra, waves, the rock, and a film.
+"""Pictures of a saved result: the string and its rotation, its history, spectra, waves, the rock, a film.
 
-Reads result folders only (`drillfem.results.open_result`). Charts need matplotlib, the string pyvista; no display.
+Reads result folders only (`drillfem.results.open_result`). Charts need matplotlib, the string needs pyvista;
+neither needs a display.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ def render_all(
         film: make string.gif as well.
 
     Returns:
-        The files written: time-series.png, spectra.png, space-time.png, rock.png (those that apply), string.png,
-        string-true.png, and string.gif.
+        The files written: time-series.png, spectra.png, space-time.png, rock.png (those that apply),
+        string.png, string-true.png, and string.gif.
 
     Raises:
         SceneError: no result there, an unknown field, or a time outside the run.
@@ -47,7 +48,7 @@ def render_result(
     story = Story(result)
     if story.fields is None:
         if field is not None or time is not None or film:
-            raise SceneError("this result has no saved fields, so there is no string to show; its history can be drawn")
+            raise SceneError("this result has no saved fields, so there is no string to show or film")
         index, chosen = -1, None
     else:
         index, chosen = story.choose_time(time), story.choose_field(field)

@@ -1,4 +1,4 @@
-"""Charts of a saved result: time series, spectra, the string's spin and speed over depth and time, and the rock."""
+"""Charts of a saved result: time series, spectra, spin and speed over depth and time, and the rock."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from drillfem.render import style
 from drillfem.render.story import Story, attribute
-from drillfem.render.straight import depth_ticks, marks, place, rpm, subtitle
+from drillfem.render.straight import depth_ticks, marks, rpm, subtitle
 from drillfem.results.spectra import Peak, amplitude_spectrum, dominant, evenly
 
 if TYPE_CHECKING:
@@ -21,14 +21,17 @@ ENVELOPE = 1500  # more samples than this are drawn as their range
 
 
 def curve(axes: Axes, time: np.ndarray, values: np.ndarray, colour: str, label: str | None = None) -> None:
-    """A line, or where there are more samples than the page has pixels, the range they cover and their running mean."""
+    """A line, or where there are more samples than the page has pixels, the range that they cover."""
     if len(time) <= 2 * ENVELOPE:
         axes.plot(time, values, color=colour, lw=1.2, label=label)
         return
     edges = np.linspace(0, len(time), ENVELOPE + 1).astype(int)[:-1]
     low, high = np.minimum.reduceat(values, edges), np.maximum.reduceat(values, edges)
     # neighbouring columns overlap by a sample, so that a steep line stays a line
-    low[1:], high[1:] = np.minimum(low[1:], values[edges[1:] - 1]), np.maximum(high[1:], values[edges[1:] - 1])
+    low[1:], high[1:] = (
+        np.minimum(low[1:], values[edges[1:] - 1]),
+        np.maximum(high[1:], values[edges[1:] - 1]),
+    )
     axes.fill_between(time[edges], low, high, color=colour, lw=0.8, alpha=0.9, label=label)
 
 
@@ -41,7 +44,7 @@ def stuck(time: np.ndarray, spin: np.ndarray, limit: float) -> list[tuple[float,
 
 
 def zoom_window(time: np.ndarray) -> tuple[float, float]:
-    """The last few seconds: about three turns of the slowest wave of a 1200 m string, less for a short run."""
+    """The last few seconds: two periods of the slowest wave in a 1200 m string."""
     end, whole = float(time[-1]), float(time[-1] - time[0])
     return end - min(5.0, whole / 4), end
 
@@ -68,12 +71,17 @@ def time_series(story: Story, path: Path) -> Path:
             for n, v in history.data_vars.items()
             if v.dims == ("time",) and not str(n).endswith("_energy")
         ][:6]
-    energies = [str(n) for n in history.data_vars if str(n).endswith("_energy") and history[n].dims == ("time",)]
+    energies = [
+        str(n) for n in history.data_vars if str(n).endswith("_energy") and history[n].dims == ("time",)
+    ]
     nominal = story.nominal
     levels = {
-        "bit_angular_speed": nominal.speed, "bit_axial_speed": nominal.penetration, "depth_of_cut": nominal.depth_of_cut,
-        "bit_weight": nominal.weight, "bit_torque": nominal.torque,
-    }  # fmt: skip
+        "bit_angular_speed": nominal.speed,
+        "bit_axial_speed": nominal.penetration,
+        "depth_of_cut": nominal.depth_of_cut,
+        "bit_weight": nominal.weight,
+        "bit_torque": nominal.torque,
+    }
     count = len(rows) + bool(energies)
     limit = float(attribute(story.scene, "bit", "torsional_regularisation", default=0.1))
     start, stop = zoom_window(time)
@@ -82,9 +90,16 @@ def time_series(story: Story, path: Path) -> Path:
         style.heading(figure, story.title, subtitle_of_history(story, time))
         height = figure.get_size_inches()[1] * style.DPI
         grid = figure.add_gridspec(
-            count, 2, width_ratios=[1.75, 1], left=0.075, right=0.985, top=1 - 125 / height, bottom=66 / height,
-            hspace=0.16, wspace=0.09,
-        )  # fmt: skip
+            count,
+            2,
+            width_ratios=[1.75, 1],
+            left=0.075,
+            right=0.985,
+            top=1 - 125 / height,
+            bottom=66 / height,
+            hspace=0.16,
+            wspace=0.09,
+        )
         axes_left: list[Axes] = []
         for k in range(count):
             for column, window in ((0, slice(None)), (1, near)):
@@ -106,37 +121,45 @@ def time_series(story: Story, path: Path) -> Path:
                         axes.set_ylabel(f"{words}\n({unit})")
                 else:
                     for n, colour in zip(
-                        energies, (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.SKY), strict=False
+                        energies,
+                        (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.SKY),
+                        strict=False,
                     ):
                         words = n.removesuffix("_energy").replace("_", " ")
-                        curve(axes, t, 1e-3 * np.asarray(history[n].values, dtype=float)[window], colour, words)
+                        curve(
+                            axes, t, 1e-3 * np.asarray(history[n].values, dtype=float)[window], colour, words
+                        )
                     if column == 0:
                         axes.set_ylabel("energy\n(kJ)")
                         axes.legend(loc="upper right", ncols=min(len(energies), 4), borderaxespad=0.1)
                 axes.set_xlim(float(t[0]), float(t[-1]))
                 axes.margins(y=0.12 if k < len(rows) else 0.5)
-                axes.yaxis.get_major_locator().set_params(nbins=5)
+                axes.locator_params(axis="y", nbins=5)
                 if k < count - 1:
                     axes.tick_params(labelbottom=False)
                 else:
                     axes.set_xlabel("load factor" if story.still else "time (s)")
                 if k == 0:
-                    axes.set_title("The whole run" if column == 0 else f"Its last {style.number(stop - start)} s")
+                    axes.set_title(
+                        "The whole run" if column == 0 else f"Its last {style.number(stop - start)} s"
+                    )
                 if column == 0:
                     axes_left.append(axes)
         figure.align_ylabels(axes_left)
-        words = ["Dashed: the nominal steady state."] if any(v is not None for v in levels.values()) else []
+        said = ["Dashed: the nominal steady state."] if any(v is not None for v in levels.values()) else []
         if nominal.speed and "bit_angular_speed" in history:
             share = stick_share(time, np.asarray(history["bit_angular_speed"].values), limit)
-            words.append(f"Orange: the bit sticks (below {limit:g} rad/s), {100 * share:.1f} % of the run.")
-        figure.text(0.985, 1 - 62 / height, "  ".join(words), ha="right", fontsize=10.5, color=style.GREY)
+            said.append(f"Orange: the bit sticks (below {limit:g} rad/s), {100 * share:.1f} % of the run.")
+        figure.text(0.985, 1 - 62 / height, "  ".join(said), ha="right", fontsize=10.5, color=style.GREY)
         return style.save(figure, path)
 
 
 def subtitle_of_history(story: Story, time: np.ndarray) -> str:
     """Model and the time that was simulated."""
     words = [f"{story.model} model"] if story.model else []
-    words.append(f"{'load factor' if story.still else 'time'} {time[0]:g} to {time[-1]:.6g}{'' if story.still else ' s'}")
+    words.append(
+        f"load factor {time[0]:g} to {time[-1]:.6g}" if story.still else f"{time[0]:g} to {time[-1]:.6g} s"
+    )
     return "   \u00b7   ".join(words)
 
 
@@ -153,7 +176,7 @@ def shade_stick(axes: Axes, time: np.ndarray, spin: np.ndarray, limit: float, ne
     axes.axhspan(-limit, limit, color=style.ORANGE, alpha=0.55, lw=0, zorder=2.5)
 
 
-# -- spectra ----------------------------------------------------------------------------------------------------------
+# -- spectra ---------------------------------------------------------------------------------------------
 def windows(time: np.ndarray) -> list[tuple[str, float, float]]:
     """The thesis' S1, S2, S3 for a run of 200 s or more, else the first and the last third."""
     start, end = float(time[0]), float(time[-1])
@@ -189,7 +212,9 @@ def spectra(story: Story, path: Path) -> Path | None:
                 even, signal = evenly(time[near], values[near])
                 step = float(even[1] - even[0])
                 results.append((*amplitude_spectrum(signal, step), dominant(signal, step, n=6)))
-            for row, ((label, a, b), (frequency, amplitude, waves)) in enumerate(zip(rows, results, strict=True)):
+            for row, ((label, a, b), (frequency, amplitude, waves)) in enumerate(
+                zip(rows, results, strict=True)
+            ):
                 axes = figure.add_subplot(grid[row, column])
                 top = float(min(25.0, fastest))
                 shown = frequency <= top
@@ -206,9 +231,13 @@ def spectra(story: Story, path: Path) -> Path | None:
                 if row == len(rows) - 1:
                     axes.set_xlabel("frequency (Hz)")
         figure.text(
-            0.985, 1 - 62 / 1200, "Curve: 2|X|/N without window. Dots: waves found with a Hann window, their frequency and amplitude.",
-            ha="right", fontsize=10.5, color=style.GREY,
-        )  # fmt: skip
+            0.985,
+            1 - 62 / 1200,
+            "Curve: 2|X|/N without window. Dots: waves found with a Hann window, frequency and amplitude.",
+            ha="right",
+            fontsize=10.5,
+            color=style.GREY,
+        )
         return style.save(figure, path)
 
 
@@ -225,14 +254,20 @@ def name_peaks(axes: Axes, waves: list[Peak], top: float) -> None:
         taken.append((x, y))
         right = x > 0.9 * top
         axes.annotate(
-            f"{x:.2f} Hz\n{style.number(y, 2)}", (x, y), xytext=(-7 if right else 7, 1), textcoords="offset points",
-            fontsize=10, va="bottom", ha="right" if right else "left", linespacing=1.05,
-        )  # fmt: skip
+            f"{x:.2f} Hz\n{style.number(y, 2)}",
+            (x, y),
+            xytext=(-7 if right else 7, 1),
+            textcoords="offset points",
+            fontsize=10,
+            va="bottom",
+            ha="right" if right else "left",
+            linespacing=1.05,
+        )
 
 
-# -- space and time -----------------------------------------------------------------------------------------------------
+# -- space and time --------------------------------------------------------------------------------------
 def finest_window(times: np.ndarray, longest: float, least: int = 12) -> slice:
-    """The part of the saved poses to look at: the last stretch saved at the finest interval, at most `longest` s of it."""
+    """The saved poses to look at: the last stretch at the finest interval, at most `longest` s of it."""
     steps = np.diff(times)
     fine = steps < 1.5 * steps.min()
     last = int(np.flatnonzero(fine)[-1]) + 1
@@ -245,7 +280,7 @@ def finest_window(times: np.ndarray, longest: float, least: int = 12) -> slice:
 
 
 def wave_speeds(story: Story) -> tuple[float | None, float | None]:
-    """Speeds of torsional and axial waves, m/s: sqrt(G/rho) and sqrt(E/rho); None where the scene does not give them."""
+    """Speeds of torsional and axial waves, m/s: sqrt(G/rho), sqrt(E/rho); None where not given."""
     material = attribute(story.scene, "material")
     density = attribute(material, "density")
     shear, youngs = attribute(material, "shear_modulus"), attribute(material, "youngs_modulus")
@@ -264,12 +299,14 @@ def space_time(story: Story, path: Path) -> Path | None:
     """space-time.png: spin and axial speed over depth and time, so that waves are seen to travel."""
     if story.fields is None or len(story.times) < 4 or story.still:
         return None
-    names = [n for n in ("spin", "axial_speed") if n in story.colour_fields]
+    wanted: tuple[str, ...] = ("spin", "axial_speed")
+    names = [n for n in wanted if n in story.colour_fields]
     if story.sideways or not names:
-        names = [n for n in ("spin", "bending_moment", "curvature", "axial_force") if n in story.colour_fields][:2]
+        wanted = ("spin", "bending_moment", "curvature", "axial_force")
+        names = [n for n in wanted if n in story.colour_fields][:2]
     if not names:
         return None
-    part = finest_window(story.times, 6.0)
+    part = finest_window(story.times, 3.0)
     times = story.times[part]
     arc = story.arc - story.arc[0]
     speeds = dict(zip(("spin", "axial_speed"), wave_speeds(story), strict=True))
@@ -280,18 +317,29 @@ def space_time(story: Story, path: Path) -> Path | None:
         fastest = speeds.get("spin")
         if fastest and coarse > 0.25 * story.length / fastest:
             note += ": too coarse to follow a wave; save more often with output.fields_interval"
-        style.heading(figure, f"{story.title}: waves along the string", f"{subtitle_of_history(story, times)}   \u00b7   {note}")
+        style.heading(
+            figure,
+            f"{story.title}: waves along the string",
+            f"{subtitle_of_history(story, times)}   \u00b7   {note}",
+        )
         grid = figure.add_gridspec(
-            len(names), 2, width_ratios=[1, 0.016], left=0.065, right=0.93, top=1 - 130 / height, bottom=70 / height,
-            hspace=0.22, wspace=0.025,
-        )  # fmt: skip
+            len(names),
+            2,
+            width_ratios=[1, 0.016],
+            left=0.065,
+            right=0.93,
+            top=1 - 130 / height,
+            bottom=70 / height,
+            hspace=0.22,
+            wspace=0.025,
+        )
         for row, name in enumerate(names):
             axes = figure.add_subplot(grid[row, 0])
             values = story.values(name)[part]
             factor, label = (1e3, "axial speed (mm/s)") if name == "axial_speed" else (1.0, story.label(name))
             values = factor * values
             middle = {"spin": story.nominal.speed, "axial_speed": story.nominal.penetration}.get(name)
-            if middle is not None:  # two-sided colours around the nominal state: slower and faster differ in hue
+            if middle is not None:  # two-sided colours: slower and faster than nominal differ in hue
                 middle *= factor
                 low, high = style.band(values)
                 reach = max(middle - low, high - middle, 1e-9)
@@ -299,7 +347,14 @@ def space_time(story: Story, path: Path) -> Path | None:
             else:
                 limits, colours = style.band(values), "cividis"
             image = axes.pcolormesh(
-                times, arc, values.T, cmap=colours, vmin=limits[0], vmax=limits[1], shading="gouraud", rasterized=True
+                times,
+                arc,
+                values.T,
+                cmap=colours,
+                vmin=limits[0],
+                vmax=limits[1],
+                shading="gouraud",
+                rasterized=True,
             )
             axes.grid(False)
             axes.set_ylim(float(arc[-1]), 0.0)
@@ -309,19 +364,25 @@ def space_time(story: Story, path: Path) -> Path | None:
             marks(axes, story, arc)
             for section in story.parts if len(story.parts) > 1 else ():
                 axes.text(
-                    times[0] + 0.006 * (times[-1] - times[0]), section.top - story.arc[0] + 0.012 * story.length, section.name,
-                    va="top", fontsize=10, color=style.INK,
+                    times[0] + 0.006 * (times[-1] - times[0]),
+                    section.top - story.arc[0] + 0.012 * story.length,
+                    section.name,
+                    va="top",
+                    fontsize=10,
+                    color=style.INK,
                     bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 2},
-                )  # fmt: skip
+                )
             speed = speeds.get(name)
             if speed and coarse <= 0.25 * story.length / speed:
                 wave_guide(axes, times, story.length, speed)
             bar = figure.colorbar(image, cax=figure.add_subplot(grid[row, 1]))
             bar.set_label(label)
-            bar.outline.set_visible(False)  # type: ignore[operator]
+            bar.outline.set_visible(False)
             if middle is not None:
                 bar.ax.axhline(middle, color=style.INK, lw=1.2)
-                bar.ax.set_title(f"nominal\n{style.number(middle, 4)}", fontsize=9, weight="normal", loc="center")
+                bar.ax.set_title(
+                    f"nominal\n{style.number(middle, 4)}", fontsize=9, weight="normal", loc="center"
+                )
             if row == len(names) - 1:
                 axes.set_xlabel("time (s)")
         return style.save(figure, path)
@@ -335,14 +396,18 @@ def wave_guide(axes: Axes, times: np.ndarray, length: float, speed: float) -> No
         return
     axes.plot([start, end], [0, length], color=style.INK, lw=1.4, ls=(0, (6, 3)))
     axes.annotate(
-        f"{speed:.0f} m/s", (start + 0.5 * length / speed, 0.5 * length), xytext=(8, 0), textcoords="offset points",
-        fontsize=10.5, bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 2},
-    )  # fmt: skip
+        f"{speed:.0f} m/s",
+        (start + 0.5 * length / speed, 0.5 * length),
+        xytext=(8, 0),
+        textcoords="offset points",
+        fontsize=10.5,
+        bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 2},
+    )
 
 
-# -- the rock -------------------------------------------------------------------------------------------------------------
+# -- the rock --------------------------------------------------------------------------------------------
 def rock(story: Story, index: int, path: Path) -> Path | None:
-    """rock.png: the hole's bottom seen from above and unrolled, and how the profile behind a blade changed."""
+    """rock.png: the hole's bottom from above and unrolled, and how the profile behind a blade changed."""
     found = story.rock(index)
     if found is None or not len(story.blades) or not story.bit_radius:
         return None
@@ -376,7 +441,9 @@ def polar(figure: Figure, story: Story, azimuth: np.ndarray, above: np.ndarray) 
     edge = np.append(a, a[0] + 2 * np.pi)
     theta, radius = np.linspace(0, 2 * np.pi, 721), np.array([0.1, 1.0]) * 1e3 * story.bit_radius
     centre = 0.5 * (theta[1:] + theta[:-1])
-    height = np.interp(centre, np.concatenate([[a[-1] - 2 * np.pi], edge]), np.concatenate([[y[-1]], y, [y[0]]]))
+    height = np.interp(
+        centre, np.concatenate([[a[-1] - 2 * np.pi], edge]), np.concatenate([[y[-1]], y, [y[0]]])
+    )
     image = axes.pcolormesh(theta, radius, height[None], cmap="cividis", shading="flat", rasterized=True)
     for k, blade in enumerate(story.blades):
         axes.plot([blade, blade], radius, color=style.INK, lw=5, solid_capstyle="butt")
@@ -390,7 +457,7 @@ def polar(figure: Figure, story: Story, azimuth: np.ndarray, above: np.ndarray) 
     axes.set_title(f"From above, radius {radius[1]:.0f} mm; blades turn clockwise", pad=34)
     bar = figure.colorbar(image, ax=axes, shrink=0.75, pad=0.09)
     bar.set_label("rock above the bit's face (mm)")
-    bar.outline.set_visible(False)  # type: ignore[operator]
+    bar.outline.set_visible(False)
 
 
 def unrolled(figure: Figure, story: Story, azimuth: np.ndarray, above: np.ndarray) -> None:
@@ -409,13 +476,28 @@ def unrolled(figure: Figure, story: Story, azimuth: np.ndarray, above: np.ndarra
     for k, blade in enumerate(np.degrees(story.blades) % 360):
         for shift in (0.0, 360.0):
             left = blade + shift - thick
-            axes.fill([left, left + thick, left + thick, left], [0, 0, roof, roof], color=style.GREY, alpha=0.85, lw=0, zorder=4)
+            axes.fill(
+                [left, left + thick, left + thick, left],
+                [0, 0, roof, roof],
+                color=style.GREY,
+                alpha=0.85,
+                lw=0,
+                zorder=4,
+            )
         axes.text(blade + 1.5, 0.93 * roof, f"{k + 1}", va="top", weight="bold", zorder=5)
     axes.annotate(
-        "turning", (0.985, 0.86), (0.90, 0.86), xycoords="axes fraction", textcoords="axes fraction", va="center", fontsize=11,
-        arrowprops={"arrowstyle": "-|>", "color": style.VERMILION, "lw": 2}, color=style.VERMILION, zorder=6,
+        "turning",
+        (0.985, 0.86),
+        (0.90, 0.86),
+        xycoords="axes fraction",
+        textcoords="axes fraction",
+        va="center",
+        fontsize=11,
+        arrowprops={"arrowstyle": "-|>", "color": style.VERMILION, "lw": 2},
+        color=style.VERMILION,
+        zorder=6,
         bbox={"facecolor": "white", "edgecolor": "none", "pad": 2},
-    )  # fmt: skip
+    )
     axes.set_xlim(0, 360)
     axes.set_ylim(floor, roof)
     axes.set_xticks(np.arange(0, 361, 30))
@@ -427,7 +509,7 @@ def unrolled(figure: Figure, story: Story, azimuth: np.ndarray, above: np.ndarra
 
 def passage(figure: Figure, story: Story, index: int) -> None:
     """The profile behind one blade over the last saved times: what the next blade will meet."""
-    part = finest_window(story.times, 4.0)
+    part = finest_window(story.times, 3.0)
     chosen = [i for i in range(len(story.times))[part] if story.rock(i) is not None]
     if len(chosen) < 3:
         return
@@ -440,13 +522,21 @@ def passage(figure: Figure, story: Story, index: int) -> None:
         a, d = story.rock(i) or reference
         face = story.at("bit_depth", float(story.times[i]))
         rows.append(1e3 * ((float(d.max()) if face is None else face) - np.interp(angle, a, d)))
-    image = axes.pcolormesh(np.degrees(angle), story.times[chosen], np.array(rows), cmap="cividis", shading="gouraud", rasterized=True)
+    image = axes.pcolormesh(
+        np.degrees(angle),
+        story.times[chosen],
+        np.array(rows),
+        cmap="cividis",
+        shading="gouraud",
+        rasterized=True,
+    )
     axes.grid(False)
     axes.set_xlabel("angle behind the blade (degrees)")
     axes.set_ylabel("time (s)")
     axes.set_title("The rock behind a blade over time")
     box = axes.get_position()
-    bar = figure.colorbar(image, cax=figure.add_axes((box.x1 + 0.012, box.y0 + 0.06, 0.012, box.height - 0.12)))
+    bar = figure.colorbar(
+        image, cax=figure.add_axes((box.x1 + 0.012, box.y0 + 0.06, 0.012, box.height - 0.12))
+    )
     bar.set_label("rock above the bit's face (mm)")
-    bar.outline.set_visible(False)  # type: ignore[operator]
-
+    bar.outline.set_visible(False)

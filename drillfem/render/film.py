@@ -9,7 +9,7 @@ import numpy as np
 
 from drillfem.render import style
 from drillfem.render.charts import finest_window
-from drillfem.render.poses import dress, draw_floor, find_view, stripe_towards, thickness, tip_way, tube_of
+from drillfem.render.poses import draw_floor, dress, find_view, stripe_towards, thickness, tip_way, tube_of
 from drillfem.render.story import Story
 from drillfem.render.straight import (
     Brush,
@@ -30,14 +30,16 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-FRAMES = 72
-LONGEST = 2.4  # s of simulated time in the film of a string that turns
+FRAMES = 60
+LONGEST = 2.0  # s of simulated time in the film of a string that turns
 MILLISECONDS = 60  # per frame
 
 
 def film(studio: Studio, story: Story, field: str | None, path: Path) -> Path:
     """string.gif: the last stretch that was saved at the finest interval, or the whole swing."""
-    part = slice(0, len(story.times)) if story.sideways or story.still else finest_window(story.times, LONGEST)
+    part = (
+        slice(0, len(story.times)) if story.sideways or story.still else finest_window(story.times, LONGEST)
+    )
     chosen = list(range(len(story.times))[part])
     if len(chosen) > FRAMES:
         chosen = [chosen[round(k)] for k in np.linspace(0, len(chosen) - 1, FRAMES)]
@@ -54,11 +56,11 @@ def save_gif(frames: list[np.ndarray], path: Path, once: bool) -> None:
     from PIL import Image
 
     pictures = [Image.fromarray(f[..., :3]) for f in frames]
-    sample = [pictures[k] for k in sorted({0, len(pictures) // 3, 2 * len(pictures) // 3, len(pictures) - 1})]
+    sample = [pictures[k] for k in sorted({(len(pictures) - 1) * n // 5 for n in range(6)})]
     wide = Image.new("RGB", (sum(p.width for p in sample), sample[0].height))
     for k, picture in enumerate(sample):
         wide.paste(picture, (k * picture.width, 0))
-    palette = wide.quantize(96, method=Image.Quantize.MEDIANCUT)
+    palette = wide.quantize(128, method=Image.Quantize.MEDIANCUT)
     small = [p.quantize(palette=palette, dither=Image.Dither.NONE) for p in pictures]
     pause = 160 if once else MILLISECONDS
     times = [pause] * len(small)
@@ -98,8 +100,8 @@ def turning(
     half = 2.3 * hole
     figure.text(0.02, 0.967, story.title, fontsize=14, weight="bold", va="center")
     clock = figure.text(0.02, 0.928, "", fontsize=11, color=style.GREY, va="center")
-    y, h, w = 84, 476, 130
-    axes = place(figure, 66, y, w, h)
+    y, h, w = 84, 476, 126
+    axes = place(figure, 82, y, w, h)
     axes.grid(False)
     ground(axes, half, hole, top, bottom, low, high)
     blank = np.zeros((2, 2, 4), np.uint8)
@@ -113,9 +115,11 @@ def turning(
     depth = pose.position[:, 2]
     line = dot = None
     if brush.field is not None:
-        chart = place(figure, 222, y, 190, h, sharey=axes)
+        chart = place(figure, 228, y, 190, h, sharey=axes)
         everything = story.values(brush.field)[chosen]
-        chart.fill_betweenx(depth, everything.min(axis=0), everything.max(axis=0), color=style.FAINT, alpha=0.55, lw=0)
+        chart.fill_betweenx(
+            depth, everything.min(axis=0), everything.max(axis=0), color=style.FAINT, alpha=0.55, lw=0
+        )
         (line,) = chart.plot([], [], color=style.INK, lw=2.2)
         (dot,) = chart.plot([], [], "o", color=style.VERMILION, ms=7)
         lo, hi = float(everything.min()), float(everything.max())
@@ -124,9 +128,11 @@ def turning(
         chart.tick_params(labelleft=False, labelbottom=False)
         chart.set_title(story.label(brush.field), fontsize=11)
         marks(chart, story, depth)
-        bar = place(figure, 222, y + h + 6, 190, 12)
+        bar = place(figure, 228, y + h + 6, 190, 12)
         lo, hi = chart.get_xlim()
-        bar.imshow(brush.cmap(brush.norm(np.linspace(lo, hi, 256)))[None], extent=(lo, hi, 0, 1), aspect="auto")
+        bar.imshow(
+            brush.cmap(brush.norm(np.linspace(lo, hi, 256)))[None], extent=(lo, hi, 0, 1), aspect="auto"
+        )
         bar.set_yticks([])
         bar.grid(False)
         bar.set_xlim(lo, hi)
@@ -148,8 +154,12 @@ def turning(
             if rock is not None:
                 steps.append(float(np.ptp(rock[1] - depth_of_bit(story, i, rock[1]))))
         scale = magnification(max(steps), story.bit_radius) if steps else None
-    view.set_title("Bit on the rock" + (f", cuts \u00d7{scale:g}" if scale else "") if with_bit else "Lower end", fontsize=11)
+    view.set_title(
+        "Bit on the rock" + (f", cuts \u00d7{scale:g}" if scale else "") if with_bit else "Lower end",
+        fontsize=11,
+    )
     frame = _flow(figure, moving)
+    pace = _pace(story, chosen)
 
     def draw(i: int) -> np.ndarray:
         now = story.pose(i)
@@ -168,7 +178,7 @@ def turning(
             things = close_up(story, brush, i, now, s - reach, s, float(now.position[-1, 2]))
             camera = Camera((0.0, 30 * wide, -8 * wide), (0.0, 0.0, -4 * wide))
         close.set_data(studio.shoot(things, camera, 300, h))
-        clock.set_text(f"{story.clock(now.time)}   \u00b7   {MILLISECONDS:g} ms shown per frame, {_pace(story, chosen)}")
+        clock.set_text(f"{story.clock(now.time)}   \u00b7   {pace}")
         return frame()
 
     return draw
@@ -182,7 +192,11 @@ def _pace(story: Story, chosen: list[int]) -> str:
     pace = 1e-3 * MILLISECONDS / step
     if pace > 1.05:
         return f"{style.number(pace, 2)} times slower than life"
-    return "as fast as life" if pace > 0.95 else f"one pose every {style.number(step)} s: the turning between is not seen"
+    return (
+        "as fast as life"
+        if pace > 0.95
+        else f"one pose every {style.number(step)} s: the turning between is not seen"
+    )
 
 
 def swing(

@@ -1,4 +1,4 @@
-"""Pictures of a string that swings or bends: its true shape with earlier poses as ghosts, in a plane or in space."""
+"""Pictures of a string that swings or bends: its true shape, with other poses as ghosts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drillfem.render.straight import Brush, place, radii, stations, subtitle
 from drillfem.render.studio import Camera, Studio, Thing, resample, tube
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -25,7 +25,7 @@ AXES = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class View:
-    """A parallel view: unit vectors to the right, up and towards the viewer; centre and half sizes of the frame in m."""
+    """A parallel view: unit vectors right, up and to the viewer; centre and half sizes of the frame, m."""
 
     right: np.ndarray
     up: np.ndarray
@@ -52,10 +52,10 @@ class View:
 
 
 def find_view(story: Story, width: int, tallest: int, room: float) -> tuple[View, int]:
-    """How to look at all poses at once: along the normal of their plane if they lie in one, else from a corner.
+    """How to look at all poses: along the normal of their plane if they lie in one, else from a corner.
 
-    width: of the frame in pixels; tallest: its greatest height; room: kept free around the string, m. The height that
-    the poses need is returned with the view.
+    width: of the frame in pixels; tallest: its greatest height; room: kept free around the string, m.
+    The height that the poses need is returned with the view.
     """
     points = story.position.reshape(-1, 3)
     ground = None
@@ -77,7 +77,11 @@ def find_view(story: Story, width: int, tallest: int, room: float) -> tuple[View
     else:
         start = story.position[0]
         plane = np.linalg.svd(start - start.mean(axis=0), full_matrices=False)
-        up = _axis_like(plane[2][2]) if plane[1][1] > 1e-3 * plane[1][0] else -gravity / np.linalg.norm(gravity)
+        up = (
+            _axis_like(plane[2][2])
+            if plane[1][1] > 1e-3 * plane[1][0]
+            else -gravity / np.linalg.norm(gravity)
+        )
         move = (points @ up)[np.argmax(np.abs((points - start[0]) @ up))] - start[0] @ up
         up = up if move >= 0 else -up
         ahead = start[-1] - start[0]
@@ -116,7 +120,9 @@ def _sign(direction: np.ndarray, points: np.ndarray) -> float:
     return 1.0 if direction @ (points[-1] - points[0]) >= -1e-9 or abs(direction).max() < 0.999 else -1.0
 
 
-def tube_of(story: Story, pose: Pose, thick: float, texture: np.ndarray | None, colour: tuple[float, ...]) -> list[Thing]:
+def tube_of(
+    story: Story, pose: Pose, thick: float, texture: np.ndarray | None, colour: tuple[float, ...]
+) -> list[Thing]:
     """The string as a tube, its radii multiplied by `thick`; textured, or in one colour."""
     arc, radius = stations(story, float(story.arc[0]), float(story.arc[-1]), 240)
     position, d1, d3 = resample(pose, arc)
@@ -150,7 +156,7 @@ def stripe_towards(pose: Pose, view: View) -> float:
 
 
 def thickness(story: Story, view: View, height: int, least: float = 9.0) -> float:
-    """Factor on the radius that makes the string at least so many pixels thick; a round number, 1 if it is anyway."""
+    """Round factor on the radius that makes the string at least so many pixels thick; 1 if it is anyway."""
     pixels = 2 * radii(story) * height / (2 * view.half[1])
     factor = least / pixels
     if factor <= 1:
@@ -160,7 +166,7 @@ def thickness(story: Story, view: View, height: int, least: float = 9.0) -> floa
 
 
 def poses_page(studio: Studio, story: Story, field: str | None, index: int, path: Path) -> Path:
-    """string.png: the chosen pose coloured by its field, the others as ghosts, the way of the tip; charts beside it."""
+    """string.png: the chosen pose coloured by its field, the others as ghosts; charts beside it."""
     pose = story.pose(index)
     x, y, w = 104, 104, 930
     view, h = find_view(story, w, 960, 0.09 * story.length)
@@ -192,11 +198,14 @@ def poses_page(studio: Studio, story: Story, field: str | None, index: int, path
         label_ghosts(axes, story, view, behind, index)
         beside(figure, story, brush, index, h)
         figure.text(
-            0.018, 0.018,
-            f"Coloured: the chosen pose, its white stripe along the director $d_{2 if brush.stripe else 1}$. Grey: other saved poses, darker is later. "
+            0.018,
+            0.018,
+            f"Coloured: the chosen pose, its white stripe along the director $d_{2 if brush.stripe else 1}$. "
+            "Grey: other saved poses, darker is later. "
             "Dotted: the way of the tip.",
-            fontsize=10, color=style.GREY,
-        )  # fmt: skip
+            fontsize=10,
+            color=style.GREY,
+        )
         return style.save(figure, path)
 
 
@@ -213,8 +222,13 @@ def dress(axes: Axes, view: View) -> None:
     for direction, axis in ((view.right, axes.xaxis), (view.up, axes.yaxis)):
         k = int(np.argmax(np.abs(direction)))
         sign = 1 if direction[k] > 0 else -1
-        axis.set_major_formatter(lambda v, _, s=sign: style.number(round(s * v, 9) + 0.0, 4))
+        axis.set_major_formatter(_signed(sign))
         axis.set_label_text(f"{AXES[k]} (m)")
+
+
+def _signed(sign: int) -> Callable[[float, object], str]:
+    """Labels of an axis that runs along (1) or against (-1) its coordinate."""
+    return lambda value, _: style.number(round(sign * value, 9) + 0.0, 4)
 
 
 def tip_way(axes: Axes, story: Story, view: View) -> None:
@@ -229,7 +243,7 @@ def tip_way(axes: Axes, story: Story, view: View) -> None:
 
 def label_ghosts(axes: Axes, story: Story, view: View, behind: Sequence[int], index: int) -> None:
     """Times at the tips of the poses, where there is room for them."""
-    left, right, bottom, top = view.extent
+    _, _, bottom, top = view.extent
     room = 0.035 * (top - bottom)
     taken: list[np.ndarray] = []
     unit = "" if story.still else " s"
@@ -243,10 +257,17 @@ def label_ghosts(axes: Axes, story: Story, view: View, behind: Sequence[int], in
             continue
         taken.append(at)
         axes.text(
-            at[0], at[1], f"{story.times[i]:.4g}{unit}", ha="center", va="center", fontsize=12 if i == index else 10,
-            weight="bold" if i == index else "normal", color=style.INK if i == index else style.GREY, zorder=6,
+            at[0],
+            at[1],
+            f"{story.times[i]:.4g}{unit}",
+            ha="center",
+            va="center",
+            fontsize=12 if i == index else 10,
+            weight="bold" if i == index else "normal",
+            color=style.INK if i == index else style.GREY,
+            zorder=6,
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.6, "pad": 1.0},
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True)
@@ -280,11 +301,15 @@ def find_floor(story: Story, up: np.ndarray) -> Floor | None:
     i, j = (n for n in range(3) if n != k)
     locator = MaxNLocator(5, steps=[1, 2, 5, 10])
     room = 1e-3 * story.length
-    a, b = (locator.tick_values(points[:, n].min() - room, points[:, n].max() + room) for n in (i, j))
+    a, b = (
+        np.asarray(locator.tick_values(points[:, n].min() - room, points[:, n].max() + room)) for n in (i, j)
+    )
     return Floor(i, j, k, a, b, float(points[:, k].min() if up[k] > 0 else points[:, k].max()))
 
 
-def draw_floor(axes: Axes, story: Story, view: View, ground: Floor, pose: Pose, behind: Sequence[int]) -> None:
+def draw_floor(
+    axes: Axes, story: Story, view: View, ground: Floor, pose: Pose, behind: Sequence[int]
+) -> None:
     """The floor with its scales, and the string's shadow on it."""
     i, j, k, a, b, level = ground.i, ground.j, ground.k, ground.a, ground.b, ground.level
 
@@ -320,7 +345,15 @@ def draw_floor(axes: Axes, story: Story, view: View, ground: Floor, pose: Pose, 
         out = out / np.linalg.norm(out)
         for spot, tick in zip(spots[1:-1], ticks[1:-1], strict=True):
             at = spot + 0.05 * size * out
-            axes.text(at[0], at[1], style.number(float(tick), 4), ha="center", va="center", fontsize=10, clip_on=False)
+            axes.text(
+                at[0],
+                at[1],
+                style.number(float(tick), 4),
+                ha="center",
+                va="center",
+                fontsize=10,
+                clip_on=False,
+            )
         at = spots.mean(axis=0) + 0.19 * size * out
         axes.text(at[0], at[1], f"{name} (m)", ha="center", va="center", fontsize=11, clip_on=False)
     tip = pose.position[-1]
@@ -328,10 +361,16 @@ def draw_floor(axes: Axes, story: Story, view: View, ground: Floor, pose: Pose, 
     axes.plot(drop[:, 0], drop[:, 1], color=style.GREY, lw=1, ls=(0, (2, 2)), zorder=4)
     foot = np.array(page(tip[i], tip[j], (level + tip[k]) / 2))
     axes.text(
-        foot[0] - 0.02 * size, foot[1], f"{AXES[k]} = {style.number(float(tip[k]), 4)} m",
-        fontsize=10.5, va="center", ha="right", color=style.GREY, zorder=6,
+        foot[0] - 0.02 * size,
+        foot[1],
+        f"{AXES[k]} = {style.number(float(tip[k]), 4)} m",
+        fontsize=10.5,
+        va="center",
+        ha="right",
+        color=style.GREY,
+        zorder=6,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.5},
-    )  # fmt: skip
+    )
 
 
 def beside(figure: Figure, story: Story, brush: Brush, index: int, height: int) -> None:
@@ -354,13 +393,22 @@ def beside(figure: Figure, story: Story, brush: Brush, index: int, height: int) 
             everything = story.values(brush.field)
             now = everything[index]
             axes.fill_between(
-                arc, np.nanmin(everything, axis=0), np.nanmax(everything, axis=0), color=style.FAINT, alpha=0.55, lw=0,
+                arc,
+                np.nanmin(everything, axis=0),
+                np.nanmax(everything, axis=0),
+                color=style.FAINT,
+                alpha=0.55,
+                lw=0,
                 label="range over the run",
-            )  # fmt: skip
+            )
             axes.plot(arc, now, color=style.INK, lw=5)
             points = np.stack([arc, now], axis=1)
             lines = LineCollection(
-                list(np.stack([points[:-1], points[1:]], axis=1)), cmap=brush.cmap, norm=brush.norm, lw=3.4, zorder=4
+                list(np.stack([points[:-1], points[1:]], axis=1)),
+                cmap=brush.cmap,
+                norm=brush.norm,
+                lw=3.4,
+                zorder=4,
             )
             lines.set_array((now[1:] + now[:-1]) / 2)
             axes.add_collection(lines, autolim=False)
@@ -371,7 +419,11 @@ def beside(figure: Figure, story: Story, brush: Brush, index: int, height: int) 
             axes.legend(loc="lower right", bbox_to_anchor=(1.02, 0.98), handlelength=1.2)
             limits = axes.get_ylim()
             bar = place(figure, x + w + 6, 130 + k * (h + 86), 14, h - 26)
-            bar.imshow(brush.cmap(brush.norm(np.linspace(limits[1], limits[0], 256)))[:, None], extent=(0, 1, *limits), aspect="auto")
+            bar.imshow(
+                brush.cmap(brush.norm(np.linspace(limits[1], limits[0], 256)))[:, None],
+                extent=(0, 1, *limits),
+                aspect="auto",
+            )
             style.panel(bar)
             axes.set_ylim(limits)
         elif chart == "tip":
@@ -388,22 +440,26 @@ def beside(figure: Figure, story: Story, brush: Brush, index: int, height: int) 
             axes.set_title("Tip position (m)")
             axes.margins(x=0, y=0.2)
             axes.set_xlabel("load factor" if story.still else "time (s)")
-            axes.legend(loc="lower right", bbox_to_anchor=(1.02, 0.98), ncols=3, handlelength=1.4, columnspacing=1.2)
+            axes.legend(
+                loc="lower right", bbox_to_anchor=(1.02, 0.98), ncols=3, handlelength=1.4, columnspacing=1.2
+            )
         else:
             time = story.history["time"].values
             total = np.zeros(len(time))
-            for n, colour in zip(energies, (style.BLUE, style.ORANGE), strict=False):
-                values = np.asarray(story.history[n].values, dtype=float)
+            for energy, colour in zip(energies, (style.BLUE, style.ORANGE), strict=False):
+                values = np.asarray(story.history[energy].values, dtype=float)
                 total = total + values
-                if not (story.still and n == "kinetic_energy"):
-                    axes.plot(time, values, color=colour, label=n.removesuffix("_energy"))
+                if not (story.still and energy == "kinetic_energy"):
+                    axes.plot(time, values, color=colour, label=energy.removesuffix("_energy"))
             if len(energies) > 1 and not story.still:
                 axes.plot(time, total, color=style.INK, lw=1, ls=(0, (5, 3)), label="sum")
             axes.axvline(float(story.times[index]), color=style.GREY, lw=1, ls=(0, (4, 3)))
             axes.set_title("Energy (J)")
             axes.margins(x=0, y=0.2)
             axes.set_xlabel("load factor" if story.still else "time (s)")
-            axes.legend(loc="lower right", bbox_to_anchor=(1.02, 0.98), ncols=3, handlelength=1.4, columnspacing=1.2)
+            axes.legend(
+                loc="lower right", bbox_to_anchor=(1.02, 0.98), ncols=3, handlelength=1.4, columnspacing=1.2
+            )
 
 
 def true_poses_page(studio: Studio, story: Story, field: str | None, index: int, path: Path) -> Path:
@@ -432,10 +488,16 @@ def true_poses_page(studio: Studio, story: Story, field: str | None, index: int,
         dress(axes, view)
         bend = np.linalg.norm(np.gradient(pose.director3, pose.arc, axis=0), axis=1)
         inner = slice(len(bend) // 8, -len(bend) // 8 or None)
-        middle = int(np.argmax(bend[inner])) + (inner.start or 0) if np.ptp(bend[inner]) > 1e-9 else len(bend) // 2
+        middle = (
+            int(np.argmax(bend[inner])) + (inner.start or 0) if np.ptp(bend[inner]) > 1e-9 else len(bend) // 2
+        )
         size = (330, 290)
         half = 5.0 * radii(story)
-        spots = (("Upper end", 0), ("Where it bends most" if bend.max() > 1e-9 else "Middle", middle), ("Lower end", -1))
+        spots = (
+            ("Upper end", 0),
+            ("Where it bends most" if bend.max() > 1e-9 else "Middle", middle),
+            ("Lower end", -1),
+        )
         for k, (name, node) in enumerate(spots):
             centre = pose.position[node]
             close = Camera(
@@ -447,15 +509,25 @@ def true_poses_page(studio: Studio, story: Story, field: str | None, index: int,
                 spine.set(visible=True, color=style.GREY)
             frame.set_facecolor("#eef1f4")
             frame.imshow(studio.shoot(things, close, *size), extent=(0, 1, 0, 1), aspect="auto")
-            times = (h / view.half[1]) and (size[1] / half) / (h / view.half[1])
-            frame.set_title(f"{name}, \u00d7{style.number(times, 2)}")
+            nearer = size[1] / half / (h / view.half[1])
+            frame.set_title(f"{name}, \u00d7{style.number(nearer, 2)}")
             bar = style.number(2 * radii(story) * 1e3, 3)
             if given:
-                frame.text(0.03, 0.04, f"thickness {bar} mm", transform=frame.transAxes, fontsize=10,
-                           bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 2})  # fmt: skip
+                frame.text(
+                    0.03,
+                    0.04,
+                    f"thickness {bar} mm",
+                    transform=frame.transAxes,
+                    fontsize=10,
+                    bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 2},
+                )
             u, v = view.project(centre)
             wide = half * size[0] / size[1]
-            axes.add_patch(Rectangle((u - wide, v - half), 2 * wide, 2 * half, fill=False, ec=style.VERMILION, lw=1.3, zorder=8))
+            axes.add_patch(
+                Rectangle(
+                    (u - wide, v - half), 2 * wide, 2 * half, fill=False, ec=style.VERMILION, lw=1.3, zorder=8
+                )
+            )
             for sign, corner in ((1, 1.0), (-1, 0.0)):
                 start = axes.transData.transform((u + wide, v + sign * half))
                 stop = frame.transAxes.transform((0.0, corner))

@@ -65,7 +65,7 @@ class Nominal:
 
 
 class Story:
-    """A result seen by its painters. `result` needs .history, .fields (or None), .scene, .manifest, .summary."""
+    """A result seen by its painters. `result`: .history, .fields (or None), .scene, .manifest, .summary."""
 
     def __init__(self, result: Any) -> None:
         self.history: xr.Dataset = result.history
@@ -100,13 +100,14 @@ class Story:
             self.parts = self._parts()
             self.sideways = self._sideways()
 
-    # -- what the scene says ----------------------------------------------------------------------------------
+    # -- what the scene says -----------------------------------------------------------------------------
     def _nominal(self) -> Nominal:
         speed = attribute(self.scene, "top_drive", "speed")
         values: dict[str, float | None] = {"speed": float(speed) if speed else None}
-        if attribute(self.scene, "bit") is not None and callable(getattr(self.scene, "nominal", None)):
+        compute = getattr(self.scene, "nominal", None)
+        if attribute(self.scene, "bit") is not None and callable(compute):
             try:
-                state = self.scene.nominal()
+                state = compute()
             except (ValueError, SceneError):
                 return Nominal(**values)
             names = {"depth_of_cut": "depth_of_cut", "penetration": "rate_of_penetration"}
@@ -149,19 +150,21 @@ class Story:
         )
 
     def _sideways(self) -> bool:
-        """Whether the string leaves the line r = (0, 0, s): bends or swings, so that its true shape is the news."""
+        """Whether the string leaves the line r = (0, 0, s), so that its true shape is the news."""
         aside = np.abs(self.position[:, :, :2]).max()
         upright = (self.position[:, -1, 2] - self.position[:, 0, 2]).min()
         return bool(aside > LATERAL * self.length or upright < (1 - LATERAL) * self.length)
 
-    # -- what the run says ------------------------------------------------------------------------------------
+    # -- what the run says -------------------------------------------------------------------------------
     @property
     def colour_fields(self) -> list[str]:
         """Scalar fields that the string can be coloured by."""
         if self.fields is None:
             return []
         names = [
-            str(n) for n, v in self.fields.data_vars.items() if v.dims == ("time", "node") and n not in NOT_COLOURS
+            str(n)
+            for n, v in self.fields.data_vars.items()
+            if v.dims == ("time", "node") and n not in NOT_COLOURS
         ]
         return sorted(names)
 
@@ -196,7 +199,9 @@ class Story:
         first, last = float(self.times[0]), float(self.times[-1])
         room = 1e-6 + 1e-9 * abs(last)
         if not (first - room <= wanted <= last + room):
-            raise SceneError(f"no picture at time {wanted:g} s: the saved poses go from {first:g} s to {last:g} s")
+            raise SceneError(
+                f"no picture at time {wanted:g} s: the saved poses go from {first:g} s to {last:g} s"
+            )
         return int(np.argmin(np.abs(self.times - wanted)))
 
     def values(self, name: str) -> np.ndarray:
@@ -210,10 +215,8 @@ class Story:
         return str(self.fields[name].attrs.get("units", ""))
 
     def label(self, name: str) -> str:
-        """'axial force / N': a name with its units, for an axis."""
-        assert self.fields is not None
-        words = str(self.fields[name].attrs.get("long_name", name.replace("_", " ")))
-        units = self.units(name)
+        """'axial force (N)': a name with its units, for an axis."""
+        words, units = name.replace("_", " "), self.units(name)
         return f"{words} ({units})" if units and units != "1" else words
 
     def pose(self, index: int) -> Pose:
@@ -256,11 +259,18 @@ class Story:
         if good.sum() < 2:
             return None
         angle, depth = angle[good], depth[good]
+        count = len(self.blades)
+        if count > 1 and angle.max() > 2 * math.pi / count * 1.01 and len(angle) % count == 0:
+            # unequal blades: one sector behind each, in the order of the blades; here all behind the first
+            each = len(angle) // count
+            sectors = angle.reshape(count, each) - angle[::each, None]
+            inside = np.clip(sectors, 1e-5, sectors[:, -1:] - 1e-5)
+            angle = ((inside - self.blades[:, None]) % (2 * math.pi)).ravel()
         order = np.argsort(angle, kind="stable")
         return angle[order], depth[order]
 
     def _rock_from_path(self, time: float) -> tuple[np.ndarray, np.ndarray] | None:
-        """What the blades left: at each angle the greatest depth that any of them had when it passed there."""
+        """What the blades left: at each angle the greatest depth of any of them when it passed there."""
         if not len(self.blades) or "bit_angle" not in self.history or "bit_depth" not in self.history:
             return None
         past = self.history["time"].values <= time + 1e-9
@@ -283,7 +293,7 @@ class Story:
         return behind, surface
 
     def at(self, name: str, time: float) -> float | None:
-        """A history value at a time, linearly between its neighbours; None if the history has no such name."""
+        """A history value at a time, linear between its neighbours; None if there is no such name."""
         if name not in self.history:
             return None
         return float(np.interp(time, self.history["time"].values, self.history[name].values))

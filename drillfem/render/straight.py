@@ -1,4 +1,4 @@
-"""Pictures of a string in a straight hole: stretched so that a 1200 m hair can be read, and at its true aspect."""
+"""Pictures of a string in a straight hole: stretched so that a 1200 m hair can be read, and true to scale."""
 
 from __future__ import annotations
 
@@ -85,7 +85,9 @@ def stations(story: Story, top: float, bottom: float, count: int) -> tuple[np.nd
     return np.concatenate(arcs), np.concatenate(widths)
 
 
-def close_up(story: Story, brush: Brush, index: int, pose: Pose, top: float, bottom: float, datum: float) -> list[Thing]:
+def close_up(
+    story: Story, brush: Brush, index: int, pose: Pose, top: float, bottom: float, datum: float
+) -> list[Thing]:
     """The string between two arc lengths at its true shape (m), with z = 0 at depth `datum`."""
     arc, radius = stations(story, top, bottom, 60)
     position, d1, d3 = resample(pose, arc)
@@ -107,18 +109,26 @@ def angle_along(pose: Pose) -> np.ndarray:
 
 
 def arrow_at(spin: float | None, radius: float, z: float, thick: float) -> list[Thing]:
-    """The arrow of the turn in LOOK_AHEAD seconds, its middle towards the viewer; none for a string that stands."""
+    """The arrow of the turn in LOOK_AHEAD seconds, its middle to the viewer; none if the string stands."""
     if spin is None or abs(spin) * LOOK_AHEAD < 0.06:
         return []
     turn = math.copysign(min(abs(spin) * LOOK_AHEAD, 1.9 * math.pi), spin)
     return [Thing(turning_arrow(radius, z, math.pi / 2 - turn / 2, turn, thick), ARROW, specular=0.1)]
 
 
-# -- the stretched picture ------------------------------------------------------------------------------------------
+# -- the stretched picture -------------------------------------------------------------------------------
 def stretched_view(
-    studio: Studio, story: Story, brush: Brush, index: int, width: int, height: int, low: float, high: float, half: float
+    studio: Studio,
+    story: Story,
+    brush: Brush,
+    index: int,
+    width: int,
+    height: int,
+    low: float,
+    high: float,
+    half: float,
 ) -> np.ndarray:
-    """The whole string between depths low..high (m) over -half..half (m) across: RGBA of width x height pixels."""
+    """The whole string, depths low..high (m), -half..half (m) across: RGBA of width x height pixels."""
     pose = story.pose(index)
     scale = (2 * half) * height / width / (high - low)  # m of the picture per m of depth: pixels stay square
     with_bit = story.drilling and story.bit_radius > 0
@@ -138,9 +148,14 @@ def stretched_view(
             thing.mesh.translate(pose.position[-1] * np.array([1.0, 1.0, scale]), inplace=True)
         things += bit
     motor = [
-        (0.0, -3.4 * wide), (2.1 * wide, -3.4 * wide), (2.3 * wide, -3.2 * wide), (2.3 * wide, -1.2 * wide),
-        (1.5 * wide, -0.7 * wide), (1.5 * wide, 0.0), (0.0, 0.0),
-    ]  # fmt: skip
+        (0.0, -3.4 * wide),
+        (2.1 * wide, -3.4 * wide),
+        (2.3 * wide, -3.2 * wide),
+        (2.3 * wide, -1.2 * wide),
+        (1.5 * wide, -0.7 * wide),
+        (1.5 * wide, 0.0),
+        (0.0, 0.0),
+    ]
     head = lathe(motor)
     head.translate(top, inplace=True)
     things.append(Thing(head, DARK_STEEL, specular=0.4))
@@ -149,7 +164,9 @@ def stretched_view(
     return studio.shoot(things, camera, width, height)
 
 
-def ground(axes: Axes, half: float, hole: float, surface: float, bottom: float, low: float, high: float) -> None:
+def ground(
+    axes: Axes, half: float, hole: float, surface: float, bottom: float, low: float, high: float
+) -> None:
     """Rock left and right of the hole and under it, the sky above: the set behind the string."""
     layers = strata(500, 220)
     share = (high - surface) / (high - low)
@@ -158,7 +175,9 @@ def ground(axes: Axes, half: float, hole: float, surface: float, bottom: float, 
     x = np.linspace(-1, 1, 200)
     wall = np.sqrt(1 - x**2) * 0.35 + 0.28  # the far wall of an empty hole, darker at its edges
     shade = np.repeat(wall[None, :, None], 2, axis=0) * np.array([0.74, 0.66, 0.56])
-    axes.imshow(shade, extent=(-hole, hole, bottom, surface), aspect="auto", interpolation="bilinear", zorder=1)
+    axes.imshow(
+        shade, extent=(-hole, hole, bottom, surface), aspect="auto", interpolation="bilinear", zorder=1
+    )
     axes.axhline(surface, color="#5d5140", lw=1.5, zorder=1.5)
     axes.set_xlim(-half, half)
     axes.set_ylim(high, low)
@@ -205,11 +224,13 @@ def string_page(studio: Studio, story: Story, field: str | None, index: int, pat
         profiles(figure, story, brush, index, pose, axes, (382, y, 232, h), (640, y, 150, h))
         insets(figure, studio, story, brush, index, pose, axes)
         figure.text(
-            0.018, 0.018,
+            0.018,
+            0.018,
             "White stripe: the director $d_1$, painted on the tube; black line: its back. "
-            f"Orange arrows: the turn in the next {LOOK_AHEAD:g} s. Drilling turns clockwise seen from above.",
-            fontsize=10, color=style.GREY,
-        )  # fmt: skip
+            f"Orange arrows: the turn in {LOOK_AHEAD:g} s. Drilling turns clockwise seen from above.",
+            fontsize=10,
+            color=style.GREY,
+        )
         return style.save(figure, path)
 
 
@@ -226,7 +247,7 @@ def depth_ticks(top: float, bottom: float) -> np.ndarray:
     """Round depths from top to bottom."""
     from matplotlib.ticker import MaxNLocator
 
-    ticks = MaxNLocator(7, steps=[1, 2, 2.5, 5, 10]).tick_values(top, bottom)
+    ticks = np.asarray(MaxNLocator(7, steps=[1, 2, 2.5, 5, 10]).tick_values(top, bottom))
     return ticks[(ticks >= top - 1e-3 * (bottom - top)) & (ticks <= bottom + 1e-3 * (bottom - top))]
 
 
@@ -240,7 +261,7 @@ def profiles(
     where: tuple[float, float, float, float],
     second: tuple[float, float, float, float],
 ) -> None:
-    """The field against depth, with the range it had over the run; its axis is the colour bar. Then the twist."""
+    """The field against depth, with its range over the run; its axis is the colour bar. Then the twist."""
     from matplotlib.collections import LineCollection
 
     depth = pose.position[:, 2]
@@ -253,7 +274,11 @@ def profiles(
         axes.fill_betweenx(depth, low, high, color=style.FAINT, alpha=0.55, lw=0, label="range over the run")
         points = np.stack([now, depth], axis=1)
         lines = LineCollection(
-            list(np.stack([points[:-1], points[1:]], axis=1)), cmap=brush.cmap, norm=brush.norm, lw=3.5, zorder=4
+            list(np.stack([points[:-1], points[1:]], axis=1)),
+            cmap=brush.cmap,
+            norm=brush.norm,
+            lw=3.5,
+            zorder=4,
         )
         lines.set_array((now[:-1] + now[1:]) / 2)
         axes.plot(now, depth, color=style.INK, lw=5.0, zorder=3, solid_capstyle="round")
@@ -267,7 +292,9 @@ def profiles(
         axes.tick_params(labelbottom=False, length=0)
         axes.legend(loc="upper right", bbox_to_anchor=(1.02, 1.0), handlelength=1.2, borderpad=0.2)
         bar = place(figure, where[0], where[1] + where[3] + 8, where[2], 16)
-        bar.imshow(brush.cmap(brush.norm(np.linspace(lo, hi, 256)))[None], extent=(lo, hi, 0, 1), aspect="auto")
+        bar.imshow(
+            brush.cmap(brush.norm(np.linspace(lo, hi, 256)))[None], extent=(lo, hi, 0, 1), aspect="auto"
+        )
         bar.set_yticks([])
         bar.grid(False)
         bar.set_xlim(lo, hi)
@@ -293,8 +320,10 @@ def marks(axes: Axes, story: Story, depth: np.ndarray) -> None:
         axes.axhline(z, color=style.GREY, lw=0.8, ls=(0, (4, 3)), zorder=2)
 
 
-# -- close-ups --------------------------------------------------------------------------------------------------------
-def insets(figure: Figure, studio: Studio, story: Story, brush: Brush, index: int, pose: Pose, whole: Axes) -> None:
+# -- close-ups -------------------------------------------------------------------------------------------
+def insets(
+    figure: Figure, studio: Studio, story: Story, brush: Brush, index: int, pose: Pose, whole: Axes
+) -> None:
     """Top drive, the change of section, and the bit on its rock, each with what is measured there."""
     x, y, across = 872, 128, 420
     heights = {"top": 240, "junction": 240, "bit": 400} if len(story.parts) > 1 else {"top": 380, "bit": 540}
@@ -322,7 +351,7 @@ def insets(figure: Figure, studio: Studio, story: Story, brush: Brush, index: in
 
 
 def leader(figure: Figure, whole: Axes, depth: float, view: Axes, turn: float) -> None:
-    """A mark at a depth of the string, and a line from that depth to its close-up that turns at pixel `turn`."""
+    """A mark at a depth of the string; a line from there to its close-up, with a bend at pixel `turn`."""
     from matplotlib.lines import Line2D
 
     edge = whole.get_xlim()[1]
@@ -366,16 +395,38 @@ def top_inset(
     datum = float(pose.position[0, 2])
     things = close_up(story, brush, index, pose, s0, s0 + reach, datum)
     motor = [
-        (0.0, -4.8 * width), (3.0 * width, -4.8 * width), (3.3 * width, -4.5 * width), (3.3 * width, -1.9 * width),
-        (2.9 * width, -1.6 * width), (1.7 * width, -1.3 * width), (1.7 * width, 0.0), (0.0, 0.0),
-    ]  # fmt: skip
+        (0.0, -4.8 * width),
+        (3.0 * width, -4.8 * width),
+        (3.3 * width, -4.5 * width),
+        (3.3 * width, -1.9 * width),
+        (2.9 * width, -1.6 * width),
+        (1.7 * width, -1.3 * width),
+        (1.7 * width, 0.0),
+        (0.0, 0.0),
+    ]
     things.append(Thing(lathe(motor), DARK_STEEL, specular=0.5))
-    things.append(Thing(lathe([(1.9 * width, -0.9 * width), (1.9 * width, -0.35 * width)]), ARROW, specular=0.2))
+    things.append(
+        Thing(lathe([(1.9 * width, -0.9 * width), (1.9 * width, -0.35 * width)]), ARROW, specular=0.2)
+    )
     for side in (-1, 1):
-        things.append(Thing(box((side * 4.6 * width - 0.3 * width, -0.4 * width, -6 * width),
-                                (0.6 * width, 0.8 * width, 20 * width)), STEEL))  # fmt: skip
-        things.append(Thing(box((min(side * 3.2, side * 4.6) * width, -0.3 * width, -3.4 * width),
-                                (1.4 * width, 0.6 * width, 0.7 * width)), STEEL))  # fmt: skip
+        things.append(
+            Thing(
+                box(
+                    (side * 4.6 * width - 0.3 * width, -0.4 * width, -6 * width),
+                    (0.6 * width, 0.8 * width, 20 * width),
+                ),
+                STEEL,
+            )
+        )
+        things.append(
+            Thing(
+                box(
+                    (min(side * 3.2, side * 4.6) * width, -0.3 * width, -3.4 * width),
+                    (1.4 * width, 0.6 * width, 0.7 * width),
+                ),
+                STEEL,
+            )
+        )
     spin = spin_at(story, index, s0, "top_angular_speed")
     things += arrow_at(spin, 2.1 * width, 3.6 * width, 0.17 * width)
     camera = Camera((0.0, 36 * width, -9 * width), (0.0, 0.0, 0.5 * width))
@@ -383,9 +434,10 @@ def top_inset(
     if spin is not None:
         facts.append(("spin", rpm(spin)))
     for name, words, unit, factor in (
-        ("top_torque", "torque", "kN m", 1e-3), ("hook_load", "hook load", "kN", 1e-3),
+        ("top_torque", "torque", "kN m", 1e-3),
+        ("hook_load", "hook load", "kN", 1e-3),
         ("top_power", "power", "kW", 1e-3),
-    ):  # fmt: skip
+    ):
         value = story.at(name, pose.time)
         if value is not None:
             facts.append((words, f"{style.number(factor * value)} {unit}"))
@@ -411,15 +463,16 @@ def junction_inset(
         facts.append(("outer diameter", f"{1e3 * above.outer:.0f} \u2192 {1e3 * below.outer:.0f} mm"))
     if spin is not None:
         facts.append(("spin", rpm(spin)))
-    for name, words, unit in (("torque", "torque", "kN m"), ("axial_force", "axial force", "kN")):
+    # the torque that is handed down, positive like those of the top drive and on the bit: minus the section moment
+    for name, unit, factor in (("torque", "kN m", -1e-3), ("axial_force", "kN", 1e-3)):
         if name in story.colour_fields:
-            value = float(np.interp(s, story.arc, story.values(name)[index]))
-            facts.append((words, f"{style.number(1e-3 * value)} {unit}"))
+            value = factor * float(np.interp(s, story.arc, story.values(name)[index]))
+            facts.append((name.replace("_", " "), f"{style.number(value)} {unit}"))
     return studio.shoot(things, camera, *size), facts[:4], datum
 
 
 def magnification(steps: float, radius: float) -> float:
-    """A round factor (1, 2 or 5 times a power of ten) that makes steps of the rock a fifth of the bit's radius high."""
+    """A round factor (1, 2, 5, 10, ...) that makes steps of the rock a fifth of the bit's radius high."""
     raw = 0.22 * radius / max(steps, 1e-9)
     power = 10.0 ** math.floor(math.log10(raw))
     return max(1.0, power * max(f for f in (1.0, 2.0, 5.0) if f * power <= raw))
@@ -428,7 +481,7 @@ def magnification(steps: float, radius: float) -> float:
 def bit_things(
     story: Story, brush: Brush, index: int, pose: Pose, scale: float | None = None
 ) -> tuple[list[Thing], float | None]:
-    """The bit at the origin, the string above it, the rock under it with heights magnified; and the magnification."""
+    """The bit at the origin, the string above, the rock below, its heights magnified; that factor."""
     a = story.bit_radius
     s = float(story.arc[-1])
     datum = float(pose.position[-1, 2])
@@ -441,7 +494,8 @@ def bit_things(
     things += drill_bit(a, story.blades, turn)
     rock = story.rock(index)
     if rock is None:
-        azimuths, z = np.linspace(0, 2 * math.pi, 73)[:-1], np.zeros(72)
+        azimuths: np.ndarray = np.linspace(0, 2 * math.pi, 73)[:-1]
+        z: np.ndarray = np.zeros(72)
     else:
         angle, depth = rock
         azimuths, around = rock_around(angle, depth, story.blades, turn)
@@ -480,10 +534,12 @@ def bit_inset(
     camera = Camera((0.0, 9.0 * a, -4.6 * a), (0.0, 0.0, -0.95 * a))
     facts = [("spin", rpm(spin))] if spin is not None else []
     for name, words, unit, factor in (
-        ("bit_axial_speed", "axial speed", "mm/s", 1e3), ("bit_weight", "weight on bit", "kN", 1e-3),
-        ("bit_torque", "torque on bit", "kN m", 1e-3), ("depth_of_cut", "depth of cut", "mm", 1e3),
+        ("bit_axial_speed", "axial speed", "mm/s", 1e3),
+        ("bit_weight", "weight on bit", "kN", 1e-3),
+        ("bit_torque", "torque on bit", "kN m", 1e-3),
+        ("depth_of_cut", "depth of cut", "mm", 1e3),
         ("bit_depth", "drilled", "m", 1.0),
-    ):  # fmt: skip
+    ):
         value = story.at(name, pose.time)
         if value is not None:
             facts.append((words, f"{style.number(factor * value)} {unit}"))
@@ -493,9 +549,9 @@ def bit_inset(
     return studio.shoot(things, camera, *size), facts, depth, title
 
 
-# -- true aspect ------------------------------------------------------------------------------------------------------
+# -- true aspect -----------------------------------------------------------------------------------------
 def true_page(studio: Studio, story: Story, field: str | None, index: int, path: Path) -> Path:
-    """string-true.png: nothing stretched, so four pictures, each ten times closer to the lower end than the one before."""
+    """string-true.png: nothing stretched, so several pictures, each ten times closer to the lower end."""
     from matplotlib.collections import LineCollection
     from matplotlib.lines import Line2D
     from matplotlib.patches import Rectangle
@@ -547,18 +603,28 @@ def true_page(studio: Studio, story: Story, field: str | None, index: int, path:
             title = "The whole string" if k == 0 else f"\u00d7{10**k:,}".replace(",", "\u2009")
             axes.set_title(title)
             axes.text(
-                0.03, 0.985, note, transform=axes.transAxes, va="top", fontsize=9.5,
-                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 3}, zorder=7,
-            )  # fmt: skip
+                0.03,
+                0.985,
+                note,
+                transform=axes.transAxes,
+                va="top",
+                fontsize=9.5,
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 3},
+                zorder=7,
+            )
             if before is not None:
                 outer = before
-                frame = Rectangle((-half, low), 2 * half, high - low, fill=False, ec=style.VERMILION, lw=1.4, zorder=8)
+                frame = Rectangle(
+                    (-half, low), 2 * half, high - low, fill=False, ec=style.VERMILION, lw=1.4, zorder=8
+                )
                 outer.add_patch(frame)
                 for level, corner in ((low, 1.0), (high, 0.0)):
                     start = outer.transData.transform((half, level))
                     stop = axes.transAxes.transform((0.0, corner))
                     ends = figure.transFigure.inverted().transform([start, stop])
-                    figure.add_artist(Line2D(ends[:, 0], ends[:, 1], color=style.VERMILION, lw=1.0, alpha=0.55))
+                    figure.add_artist(
+                        Line2D(ends[:, 0], ends[:, 1], color=style.VERMILION, lw=1.0, alpha=0.55)
+                    )
             before = axes
         if brush.field is not None:
             bar = place(figure, 96, 1118, 420, 16)
@@ -568,9 +634,13 @@ def true_page(studio: Studio, story: Story, field: str | None, index: int, path:
             bar.grid(False)
             figure.text(536 / 1600, 1 - 1126 / 1200, story.label(brush.field), va="center")
         figure.text(
-            0.5, 1 - 1126 / 1200, "Each frame is ten times closer. Depth and width have one scale in every frame.",
-            va="center", color=style.GREY, fontsize=10.5,
-        )  # fmt: skip
+            0.5,
+            1 - 1126 / 1200,
+            "Each frame is ten times closer. Depth and width have one scale in every frame.",
+            va="center",
+            color=style.GREY,
+            fontsize=10.5,
+        )
         return style.save(figure, path)
 
 
@@ -581,7 +651,15 @@ def _few_ticks() -> Any:
 
 
 def true_view(
-    studio: Studio, story: Story, brush: Brush, index: int, pose: Pose, width: int, height: int, low: float, high: float
+    studio: Studio,
+    story: Story,
+    brush: Brush,
+    index: int,
+    pose: Pose,
+    width: int,
+    height: int,
+    low: float,
+    high: float,
 ) -> np.ndarray:
     """The lower end between depths low..high (m), from the side, to scale."""
     bottom = float(pose.position[-1, 2])

@@ -1,4 +1,4 @@
-"""A head-less studio: meshes of tubes, bits and rock, and one off-screen pyvista plotter that photographs them.
+"""A head-less studio: meshes of tubes, bits and rock, and an off-screen plotter that photographs them.
 
 Pictures come back as RGBA arrays over nothing; matplotlib sets them on the page with their axes and words.
 All world coordinates are the rod's: e3 points down, so the camera's "up" is -e3.
@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,7 +47,7 @@ def load_pyvista() -> Any:
 
 @dataclass(frozen=True)
 class Thing:
-    """A mesh with its paint: one colour, a texture (its mesh carries texture coordinates), or point colours."""
+    """A mesh with its paint: one colour, a texture (the mesh carries its coordinates), or point colours."""
 
     mesh: Any
     colour: tuple[float, ...] | str = STEEL
@@ -90,7 +92,7 @@ class Studio:
         plotter, k = self._plotter, self.OVERSAMPLE
         plotter.clear_actors()
         plotter.remove_all_lights()
-        plotter.window_size = [k * width, k * height]
+        plotter.render_window.SetSize(k * width, k * height)  # plotter.window_size would render as well
         for thing in things:
             style: dict[str, Any] = {
                 "opacity": thing.opacity,
@@ -141,9 +143,9 @@ def _shrink(shot: np.ndarray, k: int) -> np.ndarray:
     return np.concatenate([colour, 255 * cover], axis=2).round().clip(0, 255).astype(np.uint8)
 
 
-# -- meshes -------------------------------------------------------------------------------------------------------
+# -- meshes ----------------------------------------------------------------------------------------------
 def surface(points: np.ndarray, normals: np.ndarray, closed: bool, uv: np.ndarray | None = None) -> Any:
-    """Quads over a grid of points (rows, columns, 3) with point normals; closed: the last column meets the first."""
+    """Quads over points (rows, columns, 3) with normals; closed: the last column meets the first."""
     pyvista = load_pyvista()
     rows, columns = points.shape[:2]
     if closed:  # the seam is doubled, so that texture coordinates run to 1 there
@@ -179,11 +181,13 @@ def resample(pose: Pose, arc: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     return position, d1, d3
 
 
-def tube(position: np.ndarray, d1: np.ndarray, d3: np.ndarray, radius: np.ndarray, v: np.ndarray) -> list[Any]:
+def tube(
+    position: np.ndarray, d1: np.ndarray, d3: np.ndarray, radius: np.ndarray, v: np.ndarray
+) -> list[Any]:
     """Skin and the two end discs of a tube with rings of `radius` (m,) around `position` (m, 3).
 
-    Texture coordinates: u = angle / 2 pi from d1 about d3, v (m,) as given. Where neighbouring rings differ in
-    radius at the same place there is a shoulder; it gets its own rings, lit along the axis.
+    Texture coordinates: u = angle / 2 pi from d1 about d3, v (m,) as given. Where neighbouring rings differ
+    in radius at the same place there is a shoulder; it gets its own rings, lit along the axis.
     """
     angle = 2 * math.pi * np.arange(SIDES) / SIDES
     d2 = np.cross(d3, d1)
@@ -197,7 +201,7 @@ def tube(position: np.ndarray, d1: np.ndarray, d3: np.ndarray, radius: np.ndarra
     u = np.linspace(0, 1, SIDES + 1)
     meshes = []
     breaks = [0, *(int(i) + 1 for i in step), len(radius)]
-    for first, last in zip(breaks[:-1], breaks[1:], strict=True):
+    for first, last in pairwise(breaks):
         piece = slice(first, last)
         uv = np.stack(np.broadcast_arrays(u[None, :], v[piece, None]), axis=2)
         if last - first > 1:
@@ -217,9 +221,10 @@ def tube(position: np.ndarray, d1: np.ndarray, d3: np.ndarray, radius: np.ndarra
 def paint(
     colours: np.ndarray, width: int = 512, half: float = 0.21, edge: float = 0.05, centre: float = 0.0
 ) -> np.ndarray:
-    """Texture (n, width, 3) uint8: `colours` (n, 3) in 0..1 along the string, a white stripe with dark edges along
-    d1 (half its width in rad) and a thin dark line along -d1, so that every view of the tube shows how it has turned.
-    `centre`: angle of the stripe from d1, rad."""
+    """Texture (n, width, 3) uint8: `colours` (n, 3) in 0..1 along the string, a white stripe with dark edges
+    along d1 and a thin dark line along -d1, so that every view of the tube shows how it has turned.
+
+    half, edge: half width of the stripe and width of its edges, rad; centre: its angle from d1, rad."""
     angle = (2 * math.pi * (np.arange(width) + 0.5) / width - centre + math.pi) % (2 * math.pi) - math.pi
     picture = np.repeat((255 * colours).round().astype(np.uint8)[:, None, :], width, axis=1)
     picture[:, np.abs(angle) < half + edge] = STRIPE_EDGE
@@ -229,11 +234,11 @@ def paint(
 
 
 def lathe(profile: Sequence[tuple[float, float]], start: float = 0.0, stop: float = 2 * math.pi) -> Any:
-    """Turned body around e3 through the origin: (radius, z) corners from the top down; flat-shaded along the profile."""
+    """Turned body around e3 through the origin: (radius, z) corners from the top down."""
     angle = np.linspace(start, stop, SIDES + 1)
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
     pieces = []
-    for (r0, z0), (r1, z1) in zip(profile[:-1], profile[1:], strict=True):
+    for (r0, z0), (r1, z1) in pairwise(profile):
         points = np.stack([r0 * ring + [0, 0, z0], r1 * ring + [0, 0, z1]])
         slant = np.array([z1 - z0, -(r1 - r0)])
         slant = slant / max(float(np.hypot(*slant)), 1e-12)
@@ -249,12 +254,15 @@ def join(meshes: Sequence[Any]) -> Any:
 
 def box(corner: Sequence[float], size: Sequence[float]) -> Any:
     """Axis-parallel box from its least corner."""
-    low, high = np.asarray(corner, dtype=float), np.asarray(corner, dtype=float) + np.asarray(size, dtype=float)
+    low, high = (
+        np.asarray(corner, dtype=float),
+        np.asarray(corner, dtype=float) + np.asarray(size, dtype=float),
+    )
     return load_pyvista().Box((low[0], high[0], low[1], high[1], low[2], high[2]))
 
 
 def turning_arrow(radius: float, z: float, start: float, turn: float, thick: float) -> Any:
-    """An arc around e3 from `start` through `turn` rad with a head at its end: how far the string turns in a while."""
+    """An arc around e3 from `start` through `turn` rad with a head at its end."""
     pyvista = load_pyvista()
     turn = math.copysign(min(abs(turn), 1.94 * math.pi), turn)
     head = min(5.5 * thick / radius, 0.6 * abs(turn)) * math.copysign(1.0, turn)
@@ -274,15 +282,18 @@ def turning_arrow(radius: float, z: float, start: float, turn: float, thick: flo
         radius=2.8 * thick,
         resolution=32,
     )
-    return join([shaft, cone.extract_surface(algorithm="dataset_surface").triangulate()])
+    return join([shaft, cone.triangulate()])
 
 
+@lru_cache(maxsize=8)
 def strata(rows: int, columns: int, seed: int = 5) -> np.ndarray:
     """A quiet picture of layered rock, (rows, columns, 3) in 0..1; always the same one."""
     rng = np.random.default_rng(seed)
     depth = np.linspace(0, 1, rows)[:, None]
     across = np.linspace(0, 1, columns)[None, :]
-    bend = 0.012 * np.sin(2 * math.pi * (0.7 * across + 0.1)) + 0.006 * np.sin(2 * math.pi * (1.9 * across + 0.4))
+    bend = 0.012 * np.sin(2 * math.pi * (0.7 * across + 0.1)) + 0.006 * np.sin(
+        2 * math.pi * (1.9 * across + 0.4)
+    )
     level = depth + bend
     tone = np.zeros((rows, columns))
     for wave in (7, 13, 29, 61):
@@ -292,12 +303,25 @@ def strata(rows: int, columns: int, seed: int = 5) -> np.ndarray:
     return DARK_SAND + (SAND - DARK_SAND) * (0.45 + 0.55 * tone[..., None])
 
 
-# -- the bit and the rock it cuts -----------------------------------------------------------------------------------
+# -- the bit and the rock it cuts ------------------------------------------------------------------------
 def drill_bit(radius: float, blades: np.ndarray, azimuth: float) -> list[Thing]:
     """A drag bit whose flat face lies in z = 0 around the origin; blade k stands at azimuth + blades[k]."""
+    turn = math.degrees(azimuth)
+    parts = _bit_parts(radius, tuple(float(b) for b in blades))
+    return [replace(part, mesh=part.mesh.rotate_z(turn)) for part in parts]
+
+
+@lru_cache(maxsize=4)
+def _bit_parts(radius: float, blades: tuple[float, ...]) -> list[Thing]:
     a = radius
     body = lathe(
-        [(0.0, -2.1 * a), (0.50 * a, -2.1 * a), (0.50 * a, -1.25 * a), (0.62 * a, -1.15 * a), (0.62 * a, -0.40 * a)]
+        [
+            (0.0, -2.1 * a),
+            (0.50 * a, -2.1 * a),
+            (0.50 * a, -1.25 * a),
+            (0.62 * a, -1.15 * a),
+            (0.62 * a, -0.40 * a),
+        ]
         + [(0.30 * a, -0.16 * a), (0.0, -0.16 * a)]
     )
     things = [Thing(body, DARK_STEEL, specular=0.5)]
@@ -305,11 +329,13 @@ def drill_bit(radius: float, blades: np.ndarray, azimuth: float) -> list[Thing]:
     pyvista = load_pyvista()
     thick = 0.15 * a
     for blade in blades:
-        phi = azimuth + float(blade)
+        phi = blade
         lead = np.array([-math.sin(phi), math.cos(phi), 0.0])  # the way it turns
         out = np.array([math.cos(phi), math.sin(phi), 0.0])
         # side view of a fin in (outward, down); the leading face lies in the plane of the blade's azimuth
-        outline = np.array([(0.10, -0.18), (0.10, 0.0), (0.99, 0.0), (1.0, -0.05), (1.0, -0.85), (0.55, -1.22)]) * a
+        outline = (
+            np.array([(0.10, -0.18), (0.10, 0.0), (0.99, 0.0), (1.0, -0.05), (1.0, -0.85), (0.55, -1.22)]) * a
+        )
         front = outline[:, :1] * out + outline[:, 1:] * np.array([0, 0, 1.0])
         back = front - thick * lead
         n = len(outline)
@@ -323,7 +349,7 @@ def drill_bit(radius: float, blades: np.ndarray, azimuth: float) -> list[Thing]:
             disc = pyvista.Cylinder(
                 center=centre, direction=lead, radius=0.075 * a, height=0.05 * a, resolution=24
             )
-            cutters.append(disc.extract_surface(algorithm="dataset_surface").triangulate())
+            cutters.append(disc.triangulate())
     if fins:
         things.append(Thing(join(fins), BRASS, specular=0.4))
         things.append(Thing(join(cutters), CUTTER, specular=0.9))
@@ -333,7 +359,7 @@ def drill_bit(radius: float, blades: np.ndarray, azimuth: float) -> list[Thing]:
 def rock_around(
     angle: np.ndarray, depth: np.ndarray, blades: np.ndarray, azimuth: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The surface all around the bit: azimuths (rad) and depths (m), from a saved profile behind the blade(s)."""
+    """The surface all around the bit: azimuths (rad), depths (m), from a profile behind the blade(s)."""
     whole = len(blades) < 2 or angle[-1] > 2 * math.pi / len(blades) * 1.01
     sectors = np.array([0.0]) if whole else blades
     # a blade's step is two points at nearly, not exactly, one angle: sorting keeps them in order
@@ -344,7 +370,7 @@ def rock_around(
 
 
 def rock_drum(radius: float, azimuth: np.ndarray, z: np.ndarray, foot: float) -> list[Thing]:
-    """Hole bottom with its steps (z at azimuth, already magnified), its rim, and a drum of rock under it to z = foot."""
+    """Hole bottom with its steps (z at azimuth, magnified), its rim, and rock under it to z = foot."""
     order = np.argsort(azimuth % (2 * math.pi), kind="stable")
     a, z = (azimuth % (2 * math.pi))[order], z[order]
     a, z = np.append(a, a[0] + 2 * math.pi), np.append(z, z[0])

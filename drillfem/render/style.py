@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -64,7 +64,7 @@ def page(width: int, height: int) -> Iterator[Figure]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(RC):
+    with matplotlib.rc_context(cast(Any, RC)):
         figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI)
         FigureCanvasAgg(figure)
         yield figure
@@ -113,5 +113,9 @@ def number(value: float, digits: int = 3) -> str:
     text = f"{value:.{digits}g}"
     if "e" in text:
         mantissa, exponent = text.split("e")
-        text = f"{float(text):,.0f}".replace(",", "\u2009") if 0 < int(exponent) < 7 else f"{mantissa}e{int(exponent)}"
+        text = (
+            f"{float(text):,.0f}".replace(",", "\u2009")
+            if 0 < int(exponent) < 7
+            else f"{mantissa}e{int(exponent)}"
+        )
     return text.replace("-", "\u2212")

@@ -330,11 +330,27 @@ class Scene:
                 "output.fields_interval",
                 f"must not be shorter than output.interval = {output.interval:g} s",
             )
-        if time.engine == "condensed" and (model := self.resolved_model().name) not in (
-            "axial-torsional",
-            "torsional",
-        ):
-            yield "time.engine", f"must be one of default, petsc for the model {model}, which is not linear"
+        if self.condensable:
+            if time.engine == "condensed" and time.integrator not in ("default", "exact"):
+                yield "time.integrator", "must be one of default, exact where time.engine = 'condensed'"
+            if time.engine == "condensed" and time.adaptive:
+                yield "time.adaptive", "must be false where time.engine = 'condensed', whose steps are equal"
+            if time.engine == "petsc" and time.integrator == "exact":
+                yield "time.engine", "must be one of default, condensed where time.integrator = 'exact'"
+        else:
+            why = f"for model {self.resolved_model().name}: only a straight drilling string is condensed to its bit"
+            if time.engine == "condensed":
+                yield "time.engine", f"must be one of default, petsc {why}"
+            if time.integrator == "exact":
+                yield "time.integrator", f"must be one of default, generalized-alpha, theta, bdf, arkimex {why}"
+        if time.integrator == "arkimex" and not 2 <= time.order <= 5:
+            yield "time.order", "must be from 2 to 5 where time.integrator = 'arkimex'"
+
+    @property
+    def condensable(self) -> bool:
+        """Whether the string is linear but for its bit, so that the condensed engine can run it."""
+        cutting = self.bit is not None and self.bit.kind == "cutting" and self.time.analysis == "dynamic"
+        return cutting and self.resolved_model().name == "axial-torsional"
 
 
 # -- files ------------------------------------------------------------------------------------------------

@@ -341,9 +341,9 @@ class Time:
     integrator: str = key(
         "time integrator",
         default="default",
-        choices=("default", "generalized-alpha", "theta", "bdf", "arkimex", "gauss", "exact"),
+        choices=("default", "generalized-alpha", "theta", "bdf", "arkimex", "exact"),
     )
-    order: int = key("order of bdf", bound=between(1, 6), default=2)
+    order: int = key("order of bdf and arkimex", bound=between(1, 6), default=2)
     rho_infinity: float = key(
         "generalized-alpha: what is left per step of infinitely fast waves", "1", between(0, 1), default=0.9
     )

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
 #: History variables of the audit: cumulative work since the start (J).
 WORKS = {
     "work_top_drive": "work put in by the top drive",
@@ -13,6 +18,21 @@ WORKS = {
     "dissipated": "work lost to internal damping",
     "work_wall": "work of contact and friction at the wall",
 }
+
+
+def imbalance(works: dict[str, Array], stored: Array, stored_at_start: float, scale: float) -> tuple[Array, float]:
+    """Relative error of the energy balance at successive times (n,), and the scale it is relative to at the last one.
+
+    works: cumulative works (n,) by the names of :data:`WORKS` (J); stored: kinetic and strain energy (n,). The scale is
+    the largest energy in play so far; ``scale`` is what it was before.
+    """
+    fed = works["work_gravity"] + works["work_hook_load"]
+    taken = works["work_bit"] + works["dissipated"] + works["work_wall"]
+    drive = works["work_top_drive"]
+    largest = np.max(np.abs([stored, drive, fed, taken]), axis=0)
+    scales = np.maximum(np.maximum.accumulate(largest), scale)
+    missing = np.abs(drive + fed - taken - (stored - stored_at_start))
+    return missing / np.where(scales > 0, scales, 1.0), float(scales[-1])
 
 
 @dataclass
@@ -34,12 +54,7 @@ class EnergyAudit:
         self.time, self.powers = time, powers
 
     def error(self, stored: float) -> float:
-        """Relative error of the balance: missing energy over the largest energy in play."""
-        w = self.works
-        put_in = w["work_top_drive"] + w["work_gravity"] + w["work_hook_load"]
-        taken = w["work_bit"] + w["dissipated"] + w["work_wall"]
-        self.scale = max(
-            self.scale, stored, abs(w["work_top_drive"]), abs(w["work_gravity"] + w["work_hook_load"]), abs(taken)
-        )
-        missing = put_in - taken - (stored - self.stored_at_start)
-        return abs(missing) / self.scale if self.scale > 0 else 0.0
+        """Relative error of the balance when kinetic and strain energy are ``stored`` (J)."""
+        works = {name: np.array([value]) for name, value in self.works.items()}
+        error, self.scale = imbalance(works, np.array([stored]), self.stored_at_start, self.scale)
+        return float(error[0])

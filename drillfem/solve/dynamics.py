@@ -37,7 +37,7 @@ def configure(ts: PETSc.TS, time: Time, prefix: str) -> None:
         ts.setARKIMEXType({2: "2e", 3: "3", 4: "4", 5: "5"}[time.order])
         ts.setARKIMEXFullyImplicit(True)
     else:
-        raise SimulationError(f"time.integrator = {kind!r} is not one of PETSc TS: use engine = 'condensed' for it")
+        raise ValueError(f"time.integrator = {kind!r} is not one of PETSc TS")
     options["ts_adapt_type"] = "basic" if time.adaptive else "none"
     ts.setTolerances(rtol=time.tolerance, atol=time.tolerance)
     ts.setFromOptions()

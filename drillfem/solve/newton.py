@@ -13,6 +13,7 @@ used in the frame that has turned since: P = T J0^-1 T^-1 with T the nodal turn.
 
 from __future__ import annotations
 
+import math
 from typing import Any, Protocol
 
 import numba
@@ -87,13 +88,13 @@ def _weighted(delta: Array, weight: Array) -> float:
 
 def turn_between(rotation_from: Any, rotation_to: Any) -> float:
     """Turn about the string's axis (rad, less than 2 pi) between two bit rotations: quaternions (4,) or angles."""
-    if np.ndim(rotation_from) == 0:
+    if isinstance(rotation_from, float):
         return float(rotation_to - rotation_from)
-    a, b, c, d = rotation_from
-    p, q, r, s = rotation_to
-    half = np.arctan2(-d * p + c * q - b * r + a * s, a * p + b * q + c * r + d * s)
+    a, b, c, d = rotation_from.tolist()
+    p, q, r, s = rotation_to.tolist()
+    half = math.atan2(-d * p + c * q - b * r + a * s, a * p + b * q + c * r + d * s)
     # q and -q are the same rotation
-    return float(2 * (half - np.pi * np.round(half / np.pi)))
+    return 2 * (half - math.pi * round(half / math.pi))
 
 
 class BitCoupledNewton:

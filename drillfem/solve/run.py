@@ -23,15 +23,7 @@ def engine_of(scene: Scene) -> str:
     """The engine a scene runs on: the straight drilling string is condensed to its bit, all else goes through PETSc."""
     if scene.time.engine != "default":
         return scene.time.engine
-    model = scene.resolved_model().name
-    condensed = (
-        model == "axial-torsional"
-        and scene.bit is not None
-        and scene.bit.kind == "cutting"
-        and scene.time.analysis == "dynamic"
-        and scene.time.integrator in ("default", "exact")
-    )
-    return "condensed" if condensed else "petsc"
+    return "condensed" if scene.condensable and scene.time.integrator in ("default", "exact") else "petsc"
 
 
 def _run(scene: Scene, out: Path | None, until: float | None, progress: Progress | None, resume: bool) -> Result:
@@ -56,14 +48,14 @@ def _run(scene: Scene, out: Path | None, until: float | None, progress: Progress
     if scene.time.analysis == "static":
         from .direct import run_static
 
-        return run_static(scene, writer, tell)  # type: ignore[no-any-return]
+        return run_static(scene, writer, tell)
     if engine == "condensed":
         from .straight import run_condensed
 
         return run_condensed(scene, writer, end, tell)
     from .direct import run_dynamic
 
-    return run_dynamic(scene, writer, end, tell)  # type: ignore[no-any-return]
+    return run_dynamic(scene, writer, end, tell)
 
 
 def simulate(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -11,13 +12,12 @@ import numpy as np
 from ..bitrock.law import BitLaw
 from ..bitrock.surface import RockSurface
 from ..compat import Array
-from ..errors import SceneError
 from ..models.initial import initial_state
 from ..models.rod import Rod
 from ..models.straight import matrices
 from ..results import Result, ResultWriter
 from ..scene import Scene
-from .audit import EnergyAudit
+from .audit import WORKS, imbalance
 from .condensed import Channel, CondensedString
 from .contact import rock_picture, surface_of
 from .direct import variables
@@ -31,8 +31,6 @@ class StraightRun:
 
     def __init__(self, scene: Scene) -> None:
         rod = self.rod = Rod(scene)
-        if rod.model != "axial-torsional" or not rod.has_bit:
-            raise SceneError(f"time.engine = 'condensed': is for a straight drilling string, not for model {rod.model}")
         u0 = initial_state(rod)
         axial, torsional = matrices(rod)
         last = len(rod.nodes) - 1
@@ -73,11 +71,8 @@ class StraightRun:
         rows["work_bit"] = rows["work_cutting"] + rows["work_wear_flat"]
         rows["work_wall"] = np.zeros_like(rows["time"])
         stored = rows["kinetic_energy"] + rows["strain_energy"]
-        audit = EnergyAudit(self.stored_at_start, 0.0, {}, scale=self.scale)
-        for i in range(len(stored)):
-            audit.works = {name: float(rows[name][i]) for name in audit.works}
-            self.energy_error = audit.error(float(stored[i]))
-        self.scale = audit.scale
+        error, self.scale = imbalance({name: rows[name] for name in WORKS}, stored, self.stored_at_start, self.scale)
+        self.energy_error = float(error[-1])
         return rows["time"] + self.rod.scene.time.start, {name: rows[name] for name in variables(True)}
 
     energy_error = 0.0
@@ -121,8 +116,6 @@ def run_condensed(
 
     def report() -> dict[str, Any]:
         return {"steps": string.count, "energy_balance_error": run.energy_error, **string.counters}
-
-    import time
 
     with writer:
         if writer.restart is not None:

@@ -3,19 +3,35 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 import xarray as xr
 
+from drillfem.errors import MissingDependency, SceneError
+from drillfem.render import charts, render_all, render_result
+from drillfem.render.story import Story
+
 HISTORY_UNITS = {
-    "bit_angular_speed": "rad/s", "bit_axial_speed": "m/s", "bit_angle": "rad", "bit_depth": "m", "bit_torque": "N m",
-    "bit_weight": "N", "depth_of_cut": "m", "top_torque": "N m", "top_angular_speed": "rad/s", "hook_load": "N",
-    "top_power": "W", "kinetic_energy": "J", "strain_energy": "J",
-}  # fmt: skip
+    "bit_angular_speed": "rad/s",
+    "bit_axial_speed": "m/s",
+    "bit_angle": "rad",
+    "bit_depth": "m",
+    "bit_torque": "N m",
+    "bit_weight": "N",
+    "depth_of_cut": "m",
+    "top_torque": "N m",
+    "top_angular_speed": "rad/s",
+    "hook_load": "N",
+    "top_power": "W",
+    "kinetic_energy": "J",
+    "strain_energy": "J",
+}
 OMEGA, RADIUS, BLADES, CUT = 14.42, 0.108, 6, 1.261e-3
 
 
@@ -42,7 +58,9 @@ def drilling(end: float = 12.0, nodes: int = 97, step: float = 0.01, fields_step
         steady = -3.48 * np.minimum(s, first) / first - 0.16 * np.maximum(s - first, 0) / (length - first)
         phi = OMEGA * t + steady
         for k, (f, a) in enumerate(modes):
-            phi = phi + a * np.sin((2 * [1, 3, 4, 6][k] - 1) * np.pi * s / 2 / length) * np.sin(2 * np.pi * f * t + k)
+            phi = phi + a * np.sin((2 * [1, 3, 4, 6][k] - 1) * np.pi * s / 2 / length) * np.sin(
+                2 * np.pi * f * t + k
+            )
         return phi
 
     def spin(s: np.ndarray, t: np.ndarray) -> np.ndarray:
@@ -55,13 +73,20 @@ def drilling(end: float = 12.0, nodes: int = 97, step: float = 0.01, fields_step
     cut = np.maximum(BLADES * (dip(time) - dip(time - 2 * np.pi / BLADES / OMEGA)), 0)
     torque = 3264 * (0.4 + 0.6 * cut / CUT)
     history = {
-        "bit_angular_speed": np.maximum(bit_spin, 0), "bit_axial_speed": np.gradient(dip(time), time),
-        "bit_angle": angle(np.array(length), time), "bit_depth": np.maximum.accumulate(dip(time)),
-        "bit_torque": torque, "bit_weight": 32.66e3 + 1.034e7 * cut, "depth_of_cut": cut,
-        "top_torque": np.full_like(time, 3264.0), "top_angular_speed": np.full_like(time, OMEGA),
-        "hook_load": np.full_like(time, 415e3), "top_power": np.full_like(time, 47.1e3),
-        "kinetic_energy": 1.5e4 + 50 * np.sin(time), "strain_energy": 6e3 + 40 * np.cos(time),
-    }  # fmt: skip
+        "bit_angular_speed": np.maximum(bit_spin, 0),
+        "bit_axial_speed": np.gradient(dip(time), time),
+        "bit_angle": angle(np.array(length), time),
+        "bit_depth": np.maximum.accumulate(dip(time)),
+        "bit_torque": torque,
+        "bit_weight": 32.66e3 + 1.034e7 * cut,
+        "depth_of_cut": cut,
+        "top_torque": np.full_like(time, 3264.0),
+        "top_angular_speed": np.full_like(time, OMEGA),
+        "hook_load": np.full_like(time, 415e3),
+        "top_power": np.full_like(time, 47.1e3),
+        "kinetic_energy": 1.5e4 + 50 * np.sin(time),
+        "strain_energy": 6e3 + 40 * np.cos(time),
+    }
     s, t = arc[None, :], when[:, None]
     phi = angle(s, t)
     zero = np.zeros_like(phi)
@@ -71,38 +96,59 @@ def drilling(end: float = 12.0, nodes: int = 97, step: float = 0.01, fields_step
     fields = xr.Dataset(
         {
             "position": (("time", "node", "xyz"), np.stack([zero, zero, z], axis=2), {"units": "m"}),
-            "director1": (("time", "node", "xyz"), np.stack([np.cos(phi), np.sin(phi), zero], axis=2), {"units": "1"}),
+            "director1": (
+                ("time", "node", "xyz"),
+                np.stack([np.cos(phi), np.sin(phi), zero], axis=2),
+                {"units": "1"},
+            ),
             "director3": (("time", "node", "xyz"), np.stack([zero, zero, zero + 1], axis=2), {"units": "1"}),
             "spin": (("time", "node"), spin(s, t), {"units": "rad/s"}),
-            "axial_speed": (("time", "node"), 2.894e-3 + 0.005 * np.cos(3 * np.pi * s / length) * np.cos(40 * t), {"units": "m/s"}),
+            "axial_speed": (
+                ("time", "node"),
+                2.894e-3 + 0.005 * np.cos(3 * np.pi * s / length) * np.cos(40 * t),
+                {"units": "m/s"},
+            ),
             "axial_force": (("time", "node"), 415e3 - 384 * s + 0 * t, {"units": "N"}),
             "outer_diameter": ("node", np.where(arc <= first, 0.127, 0.1524), {"units": "m"}),
             "rock_angle": (("time", "rock_node"), np.broadcast_to(eta, past.shape), {"units": "rad"}),
             "rock_height": (("time", "rock_node"), dip(past), {"units": "m"}),
         },
         coords={"time": ("time", when, {"units": "s"}), "arc_length": ("node", arc, {"units": "m"})},
-    )  # fmt: skip
+    )
     string = (
         SimpleNamespace(name="drill pipe", length=first, outer_diameter=0.127, inner_diameter=0.108),
         SimpleNamespace(name="collars", length=length - first, outer_diameter=0.1524, inner_diameter=0.056),
     )
     nominal = SimpleNamespace(
-        depth_of_cut=CUT, rate_of_penetration=2.894e-3, torque_on_bit=3264.0, hook_load=415e3, weight_on_bit=45.7e3
+        depth_of_cut=CUT,
+        rate_of_penetration=2.894e-3,
+        torque_on_bit=3264.0,
+        hook_load=415e3,
+        weight_on_bit=45.7e3,
     )
     scene = SimpleNamespace(
-        title="Chapter 6, C1, c_d = 1e-4 s", name="vertical-c1-cd4", string=string, hole=SimpleNamespace(kind="straight", diameter=0.2159),
+        title="Chapter 6, C1, c_d = 1e-4 s",
+        name="vertical-c1-cd4",
+        string=string,
+        hole=SimpleNamespace(kind="straight", diameter=0.2159),
         bit=SimpleNamespace(kind="cutting", radius=RADIUS, blades=BLADES, blade_angles=None),
-        top_drive=SimpleNamespace(kind="imposed-speed", speed=OMEGA), time=SimpleNamespace(analysis="dynamic"),
-        material=SimpleNamespace(shear_modulus=77e9, youngs_modulus=210e9, density=7800.0), nominal=lambda: nominal,
-    )  # fmt: skip
+        top_drive=SimpleNamespace(kind="imposed-speed", speed=OMEGA),
+        time=SimpleNamespace(analysis="dynamic"),
+        material=SimpleNamespace(shear_modulus=77e9, youngs_modulus=210e9, density=7800.0),
+        nominal=lambda: nominal,
+    )
     data = {n: ("time", v, {"units": HISTORY_UNITS[n]}) for n, v in history.items()}
     return FakeResult(
-        xr.Dataset(data, coords={"time": ("time", time, {"units": "s"})}), fields, scene, {}, {"model": "axial-torsional"}
-    )  # fmt: skip
+        xr.Dataset(data, coords={"time": ("time", time, {"units": "s"})}),
+        fields,
+        scene,
+        {},
+        {"model": "axial-torsional"},
+    )
 
 
 def bending(kind: str = "pendulum", nodes: int = 33, poses: int = 21) -> FakeResult:
-    """A rod of 1 m that swings and bends in the plane x-z, or an arc in space that is pulled out of its plane."""
+    """A rod of 1 m that swings and bends in the plane x-z, or an arc that is pulled out of its plane."""
     length, arc = 1.0, np.linspace(0, 1.0, nodes)
     when = np.linspace(0, 2.0, poses) if kind == "pendulum" else np.linspace(0, 1.0, poses)
     position, d1, d3 = (np.zeros((poses, nodes, 3)) for _ in range(3))
@@ -132,10 +178,182 @@ def bending(kind: str = "pendulum", nodes: int = 33, poses: int = 21) -> FakeRes
     )
     planar = kind == "pendulum"
     scene = SimpleNamespace(
-        title="Appendix B.1, flexible pendulum" if planar else "45-degree bend", name=kind, bit=None, top_drive=None, hole=None,
-        string=(SimpleNamespace(name="cord", length=length, outer_diameter=0.04 if planar else None, inner_diameter=0.0),),
+        title="Appendix B.1, flexible pendulum" if planar else "45-degree bend",
+        name=kind,
+        bit=None,
+        top_drive=None,
+        hole=None,
+        string=(
+            SimpleNamespace(
+                name="cord", length=length, outer_diameter=0.04 if planar else None, inner_diameter=0.0
+            ),
+        ),
         gravity=SimpleNamespace(direction=(1.0, 0.0, 0.0), magnitude=9.81 if planar else 0.0),
-        time=SimpleNamespace(analysis="dynamic" if planar else "static"), material=None,
-    )  # fmt: skip
+        time=SimpleNamespace(analysis="dynamic" if planar else "static"),
+        material=None,
+    )
     data = {n: ("time", v, {"units": "J"}) for n, v in history.items()}
-    return FakeResult(xr.Dataset(data, coords={"time": ("time", time, {"units": "s"})}), fields, scene, {}, {"model": "planar"})
+    return FakeResult(
+        xr.Dataset(data, coords={"time": ("time", time, {"units": "s"})}),
+        fields,
+        scene,
+        {},
+        {"model": "planar"},
+    )
+
+
+def pixels(path: Path) -> np.ndarray:
+    """A picture as (height, width, 3) integers."""
+    from PIL import Image
+
+    with Image.open(path) as picture:
+        return np.asarray(picture.convert("RGB")).astype(int)
+
+
+def share(picture: np.ndarray, colour: tuple[int, int, int], within: int = 12) -> float:
+    """Share of the pixels that have about this colour."""
+    return float((np.abs(picture - np.array(colour)).max(axis=2) <= within).mean())
+
+
+@pytest.fixture(scope="module")
+def drilled(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """All pictures and the film of a short drilling run."""
+    pytest.importorskip("pyvista")
+    folder = tmp_path_factory.mktemp("drilled")
+    made = render_result(
+        drilling(end=2.0, nodes=49, fields_step=0.1), folder / "pictures", time=1.23, film=True
+    )
+    return {path.name: path for path in made}
+
+
+def test_all_pictures_are_made(drilled: dict[str, Path]) -> None:
+    assert set(drilled) == {
+        "time-series.png",
+        "spectra.png",
+        "space-time.png",
+        "rock.png",
+        "string.png",
+        "string-true.png",
+        "string.gif",
+    }
+    for name, path in drilled.items():
+        picture = pixels(path)
+        assert min(picture.shape[:2]) > 500, name
+        assert picture.std() > 12, f"{name} is blank"
+
+
+def test_the_string_shows_field_stripe_rock_and_arrows(drilled: dict[str, Path]) -> None:
+    picture = pixels(drilled["string.png"])
+    whole = picture[170:1080, 150:300]  # the stretched string in its hole
+    assert share(whole, (24, 26, 30), 30) > 0.005  # the black line or the stripe's edges
+    assert len(np.unique(whole.reshape(-1, 3) // 16, axis=0)) > 60  # coloured by a field, shaded
+    bit = picture[640:1100, 870:1300]
+    assert share(bit, (201, 161, 71), 50) > 0.01  # brass blades
+    assert share(picture[120:1100, 870:1300], (213, 94, 0), 40) > 0.002  # arrows
+
+
+def test_a_turned_string_is_painted_differently(tmp_path: Path) -> None:
+    pytest.importorskip("pyvista")
+    from drillfem.render.straight import Brush, stretched_view
+    from drillfem.render.studio import Studio
+
+    story = Story(drilling(end=0.5, nodes=49, fields_step=0.1))
+    assert story.fields is not None
+    with Studio() as studio:
+        shots = []
+        for turned in (0.0, np.pi):
+            phi = np.full((len(story.times), len(story.arc)), np.pi / 2 + turned)
+            d1 = np.stack([np.cos(phi), np.sin(phi), 0 * phi], axis=2)
+            story.fields["director1"].values[:] = d1
+            shots.append(stretched_view(studio, story, Brush(story, "spin"), 0, 120, 400, -60.0, 1240.0, 0.3))
+    white = [float(((s[..., :3].min(axis=2) > 200) & (s[..., 3] > 200))[100:300].mean()) for s in shots]
+    assert white[0] > 0.03 and white[1] < 0.2 * white[0]  # the stripe faces us, then is behind
+
+
+def test_same_result_same_picture(tmp_path: Path) -> None:
+    story = Story(drilling(end=2.0, nodes=33, fields_step=0.1))
+    first = charts.spectra(story, tmp_path / "a.png")
+    again = charts.spectra(story, tmp_path / "b.png")
+    assert first is not None and again is not None
+    assert first.read_bytes() == again.read_bytes()
+
+
+def test_unknown_field_is_one_line_that_lists_what_is_there(tmp_path: Path) -> None:
+    with pytest.raises(SceneError) as caught:
+        render_result(drilling(end=0.5, nodes=9), tmp_path / "pictures", field="temperature")
+    message = str(caught.value)
+    assert "\n" not in message and "'temperature'" in message
+    assert "axial_force, axial_speed, spin" in message
+    assert not (tmp_path / "pictures").exists()
+
+
+def test_a_time_outside_the_run_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"from 0 s to 0\.5 s"):
+        render_result(drilling(end=0.5, nodes=9), tmp_path / "pictures", time=7.0)
+    assert not (tmp_path / "pictures").exists()
+
+
+def test_no_result_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SceneError):
+        render_all(tmp_path / "nothing")
+
+
+def test_without_pyvista_the_charts_are_made_and_one_line_says_how_to_get_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    with pytest.raises(MissingDependency, match="pip install pyvista") as caught:
+        render_result(drilling(end=1.0, nodes=17, fields_step=0.1), tmp_path)
+    assert "\n" not in str(caught.value)
+    assert (tmp_path / "time-series.png").exists() and (tmp_path / "rock.png").exists()
+
+
+@pytest.mark.parametrize("kind", ["pendulum", "bend"])
+def test_a_string_that_bends_is_shown_by_its_true_shape(kind: str, tmp_path: Path) -> None:
+    pytest.importorskip("pyvista")
+    result = bending(kind, nodes=17, poses=6)
+    assert Story(result).sideways and Story(result).still == (kind == "bend")
+    made = {p.name: p for p in render_result(result, tmp_path, film=kind == "bend")}
+    assert {"string.png", "string-true.png", "time-series.png"} <= set(made)
+    assert "rock.png" not in made
+    for path in made.values():
+        assert pixels(path).std() > 12
+
+
+def test_the_rock_from_the_bits_path_is_the_saved_one() -> None:
+    story = Story(drilling(end=3.0, nodes=9, step=1e-3, fields_step=0.5))
+    assert story.fields is not None
+    saved = story.rock(4)
+    story.fields = story.fields.drop_vars(["rock_angle", "rock_height"])
+    # a bit that turns evenly leaves L(eta) = U(t - eta / omega), as the generator saves it
+    turned = OMEGA * story.history["time"].values
+    story.history["bit_angle"].values[:] = turned
+    story.history["bit_depth"].values[:] = 2.894e-3 * story.history["time"].values
+    found = story.rock(4)
+    assert saved is not None and found is not None
+    angle, depth = found
+    assert angle[-1] == pytest.approx(2 * math.pi / BLADES)
+    assert depth[:-1] == pytest.approx(2.894e-3 * (2.0 - angle[:-1] / OMEGA), abs=1e-9)
+    assert (depth[0] - depth[-1]) * BLADES == pytest.approx(CUT, rel=1e-3)
+
+
+def test_stick_intervals() -> None:
+    time = np.linspace(0, 10, 1001)
+    spin = np.where((time > 2) & (time < 3) | (time > 9), 0.0, 14.0)
+    intervals = charts.stuck(time, spin, 0.1)
+    assert intervals == [
+        (pytest.approx(2.01), pytest.approx(3.0)),
+        (pytest.approx(9.01), pytest.approx(10.0)),
+    ]
+
+
+def test_windows_of_the_spectra() -> None:
+    assert [w[0] for w in charts.windows(np.linspace(0, 200, 2001))] == ["S1", "S2", "S3"]
+    assert charts.windows(np.linspace(0, 30, 301))[1][1:] == (20.0, 30.0)
+
+
+def test_space_time_takes_the_finest_part() -> None:
+    times = np.concatenate([np.arange(0, 200, 10.0), np.arange(194, 200.01, 0.02) + 1e-4])
+    part = charts.finest_window(np.unique(times), 6.0)
+    assert np.unique(times)[part][0] > 193.9
+    assert charts.finest_window(np.arange(0, 201, 10.0), 6.0) == slice(0, 21)
