@@ -64,12 +64,16 @@ class Ansatz:
         """Virtual twist of a variation of the configuration fields (statics)."""
         raise NotImplementedError
 
+    def virtual(self, test: Expr) -> Twist:
+        """Virtual twist of a test function with as many components as the configuration (statics)."""
+        return self.twist(test, None)
+
     def rate(self, x: Expr, v: Expr) -> Expr:
         """Time derivative of the configuration fields that belongs to a velocity field."""
         return v
 
-    def constraint(self, x: Expr) -> Expr | None:
-        """What the configuration must satisfy besides equilibrium: g(x) = 0, or None."""
+    def constraint(self, x: Expr, test: Expr) -> Expr | None:
+        """What the configuration must satisfy besides equilibrium, tested with what :meth:`virtual` leaves of ``test``."""
         return None
 
 
@@ -142,14 +146,18 @@ class Spatial(Ansatz):
         dr = ufl.as_vector([dx[i] for i in range(3)])
         return Twist(dr, material_rate_of_quaternion(self.quaternion(x), self.quaternion(dx)))
 
+    def virtual(self, test: Expr) -> Twist:
+        # (dr, multiplier of the constraint, dtheta): virtual rotations are interpolated, as in dynamics
+        return Twist(ufl.as_vector([test[i] for i in range(3)]), ufl.as_vector([test[i] for i in range(4, 7)]))
+
     def rate(self, x: Expr, v: Expr) -> Expr:
         q = self.quaternion(x)
         dq = quaternion_rate(q, ufl.as_vector([v[i] for i in range(3, 6)])) + self.correction * (1 - ufl.dot(q, q)) * q
         return ufl.as_vector([v[i] for i in range(3)] + [dq[i] for i in range(4)])
 
-    def constraint(self, x: Expr) -> Expr:
+    def constraint(self, x: Expr, test: Expr) -> Expr:
         q = self.quaternion(x)
-        return ufl.dot(q, q) - 1
+        return (ufl.dot(q, q) - 1) * test[3]
 
 
 def ansatz(name: str, literal: bool = False) -> Ansatz:

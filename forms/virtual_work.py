@@ -222,21 +222,15 @@ def static_terms(
 ) -> Terms:
     """Equilibrium in the configuration fields alone; x, test of shape (len(a.x_names),).
 
-    The ansatz' constraint (|q| = 1) closes the system. It stiffens the one direction that no virtual rotation spans, and
-    must outweigh the strain energy of an element of size h: between nodes of unequal |q| the interpolated rotation swerves,
-    and a weight that does not grow with 1/h2 leaves the nodes free to do so.
+    The ansatz' constraint (|q| = 1 at every node) closes the system; its rows carry the torsional stiffness, to have the
+    size of the others. It is no penalty: where |q| may differ between nodes, the rotation between them swerves.
     """
     at = a.configuration(x, s)
     still = Twist(0 * at.r, 0 * at.u_m)
-    virtual = a.variation(test, x)
-    terms = virtual_work(at, still, still, virtual, section, loads, on, literal)
-    g = a.constraint(x)
+    terms = virtual_work(at, still, still, a.virtual(test), section, loads, on, literal)
+    g = a.constraint(x, test)
     if g is not None:
-        # dg . test / 2 = q . dq: the direction that no virtual rotation spans
-        q, dq = x, test
-        along = sum(q[i] * dq[i] for i in range(3, 7))
-        h = ufl.CellVolume(ufl.domain.extract_unique_domain(test))
-        terms["constraint"] = 1e4 * section["torsion"] / h**2 * g * along * on.nodal
+        terms["constraint"] = section["torsion"] * g * on.nodal
     return terms
 
 

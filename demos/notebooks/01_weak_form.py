@@ -429,20 +429,18 @@ assert worst < 1e-13
 # the other side of the equation. You will find it in one line of the whole form, in section 7.
 
 # %%
-show(virtual_work.inertia)
+show(virtual_work.spin_rate, virtual_work.inertia)
 
 # %% [markdown]
 # Here, too, there are two roads. UFL can differentiate the spin momentum $\mathbf R\,\boldsymbol\Theta\,
-# \boldsymbol\omega_m$ of the moving corkscrew with respect to time. And the function above gives Euler's
-# form of it, one component at a time, if the virtual motion is a turn about one director.
+# \boldsymbol\omega_m$ of the moving corkscrew with respect to time, and look at the result along the
+# directors. Or it can take Euler's word.
 
 # %%
-lopsided = Section(ufl.as_vector([1.0] * SECTION.index("inertia1") + [1.0, 2.0, 0.0, 0.0]))  # Theta = diag(1, 2, 3)
+Theta = ufl.diag(ufl.as_vector((1.0, 2.0, 3.0)))  # kg m, a lopsided section
 still = ufl.as_vector((0.0, 0.0, 0.0))
-rate = Twist(still, ufl.diff(motion.w, t))
-directions = [ufl.as_vector(np.eye(3)[k].tolist()) for k in range(3)]
-by_euler = [virtual_work.inertia(motion, rate, Twist(still, turn), lopsided) for turn in directions]
-by_clock = R.T * ufl.diff(R * lopsided.Theta * motion.w, t)
+by_euler = virtual_work.spin_rate(Theta, motion, Twist(still, ufl.diff(motion.w, t)))
+by_clock = R.T * ufl.diff(R * Theta * motion.w, t)
 difference = at_midpoints(ufl.as_vector([*by_euler, *by_clock]))
 worst = np.abs(difference[:, :3] - difference[:, 3:]).max()
 print(f"largest rate {np.abs(difference).max():.3f}, largest difference of the two roads {worst:.1e}")

@@ -52,6 +52,11 @@ def render_result(
         index, chosen = -1, None
     else:
         index, chosen = story.choose_time(time), story.choose_field(field)
+        if film and len(story.times) < charts.MIN_POSES:
+            raise SceneError(
+                f"only {len(story.times)} poses were saved, too few for a film: run with a shorter "
+                "output.fields_interval"
+            )
     try:
         pictures.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+MIN_POSES = 8  # fewer are no film and no diagram
 ENVELOPE = 1500  # more samples than this are drawn as their range
 
 
@@ -44,13 +45,13 @@ def stuck(time: np.ndarray, spin: np.ndarray, limit: float) -> list[tuple[float,
 
 
 def zoom_window(time: np.ndarray) -> tuple[float, float]:
-    """The last few seconds: two periods of the slowest wave in a 1200 m string."""
+    """The last few seconds, in which the single waves are seen."""
     end, whole = float(time[-1]), float(time[-1] - time[0])
-    return end - min(5.0, whole / 4), end
+    return end - min(3.0, whole / 4), end
 
 
-ROWS: tuple[tuple[str, str, float, str, str], ...] = (
-    # history name, words, factor, unit, colour
+Row = tuple[str, str, float, str, str]  # history name, words, factor, unit, colour
+ROWS: tuple[Row, ...] = (
     ("bit_angular_speed", "bit spin", 1.0, "rad/s", style.BLUE),
     ("bit_axial_speed", "axial speed", 1e3, "mm/s", style.BLUE),
     ("depth_of_cut", "depth of cut", 1e3, "mm", style.GREEN),
@@ -60,106 +61,114 @@ ROWS: tuple[tuple[str, str, float, str, str], ...] = (
 )
 
 
+def other_rows(story: Story) -> list[Row]:
+    """What changes in the history of a run without a bit: the tip first, at most six; energies come by themselves."""
+    names = [
+        str(n)
+        for n, v in story.history.items()
+        if v.dims == ("time",) and not str(n).startswith("work_") and str(n) != "dissipated"
+    ]
+    names = [n for n in names if not n.endswith("_energy") and np.ptp(story.history[n].values) > 1e-12]
+    names.sort(key=lambda n: not n.startswith("tip_"))
+    return [(n, n.replace("_", " "), 1.0, str(story.history[n].attrs.get("units", "")), style.BLUE) for n in names[:6]]
+
+
 def time_series(story: Story, path: Path) -> Path:
     """time-series.png: what happened at the bit and to the energy, the whole run and its last seconds."""
     history = story.history
     time = np.asarray(history["time"].values, dtype=float)
     rows = [row for row in ROWS if row[0] in history]
     if not rows:
-        rows = [
-            (str(n), str(n).replace("_", " "), 1.0, str(v.attrs.get("units", "")), style.BLUE)
-            for n, v in history.data_vars.items()
-            if v.dims == ("time",) and not str(n).endswith("_energy")
-        ][:6]
-    energies = [
-        str(n) for n in history.data_vars if str(n).endswith("_energy") and history[n].dims == ("time",)
-    ]
-    nominal = story.nominal
-    levels = {
-        "bit_angular_speed": nominal.speed,
-        "bit_axial_speed": nominal.penetration,
-        "depth_of_cut": nominal.depth_of_cut,
-        "bit_weight": nominal.weight,
-        "bit_torque": nominal.torque,
-    }
-    count = len(rows) + bool(energies)
+        rows = other_rows(story)
+    energies = [str(n) for n, v in history.items() if str(n).endswith("_energy") and v.dims == ("time",)]
+    count, columns = len(rows) + bool(energies), 2 if story.drilling else 1
     limit = float(attribute(story.scene, "bit", "torsional_regularisation", default=0.1))
     start, stop = zoom_window(time)
     near = (time >= start) & (time <= stop)
-    with style.page(1600, 1400 if count > 5 else 1200) as figure:
+    with style.page(1600, 1400 if count > 5 else max(500, 230 * count + 190)) as figure:
         style.heading(figure, story.title, subtitle_of_history(story, time))
         height = figure.get_size_inches()[1] * style.DPI
+        top, bottom = 1 - 125 / height, 66 / height
         grid = figure.add_gridspec(
             count,
-            2,
-            width_ratios=[1.75, 1],
+            columns,
+            width_ratios=[1.75, 1][:columns],
             left=0.075,
             right=0.985,
-            top=1 - 125 / height,
-            bottom=66 / height,
+            top=top,
+            bottom=bottom,
             hspace=0.16,
             wspace=0.09,
         )
         axes_left: list[Axes] = []
-        for k in range(count):
-            for column, window in ((0, slice(None)), (1, near)):
-                axes = figure.add_subplot(grid[k, column])
-                t = time[window]
-                if k < len(rows):
-                    name, words, factor, unit, colour = rows[k]
-                    values = factor * np.asarray(history[name].values, dtype=float)[window]
-                    if name == "bit_angular_speed" and nominal.speed:
-                        shade_stick(axes, time, np.asarray(history[name].values), limit, column == 1)
-                    curve(axes, t, values, colour)
-                    level = levels.get(name)
-                    if level is not None:
-                        axes.axhline(factor * level, color=style.VERMILION, lw=1.1, ls=(0, (5, 3)), zorder=3)
-                    if name == "bit_depth" and nominal.penetration is not None:
-                        line = factor * nominal.penetration * (t - time[0])
-                        axes.plot(t, line, color=style.VERMILION, lw=1.1, ls=(0, (5, 3)), zorder=3)
-                    if column == 0:
-                        axes.set_ylabel(f"{words}\n({unit})")
-                else:
-                    for n, colour in zip(
-                        energies,
-                        (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.SKY),
-                        strict=False,
-                    ):
-                        words = n.removesuffix("_energy").replace("_", " ")
-                        curve(
-                            axes, t, 1e-3 * np.asarray(history[n].values, dtype=float)[window], colour, words
-                        )
-                    if column == 0:
-                        axes.set_ylabel("energy\n(kJ)")
-                        axes.legend(loc="upper right", ncols=min(len(energies), 4), borderaxespad=0.1)
-                axes.set_xlim(float(t[0]), float(t[-1]))
-                axes.margins(y=0.12 if k < len(rows) else 0.5)
-                axes.locator_params(axis="y", nbins=5)
-                if k < count - 1:
-                    axes.tick_params(labelbottom=False)
-                else:
-                    axes.set_xlabel("load factor" if story.still else "time (s)")
-                if k == 0:
-                    axes.set_title(
-                        "The whole run" if column == 0 else f"Its last {style.number(stop - start)} s"
-                    )
-                if column == 0:
-                    axes_left.append(axes)
+        for k, column in np.ndindex(count, columns):
+            window = near if column else slice(None)
+            axes = figure.add_subplot(grid[k, column])
+            if k == 0:
+                axes.set_title(f"Its last {style.number(stop - start)} s" if column else "The whole run")
+            if k < len(rows):
+                if rows[k][0] == "bit_angular_speed" and story.nominal.speed:
+                    shade_stick(axes, time, np.asarray(history["bit_angular_speed"].values), limit, column == 1)
+                draw_row(axes, story, rows[k], time, window)
+            else:
+                draw_energies(axes, story, energies, time, window)
+                if column == columns - 1:
+                    axes.legend(loc="upper right", ncols=min(len(energies), 4), borderaxespad=0.1)
+            axes.set_xlim(float(time[window][0]), float(time[window][-1]))
+            axes.margins(y=0.12 if k < len(rows) else 0.5)
+            axes.locator_params(axis="y", nbins=5)
+            if k < count - 1:
+                axes.tick_params(labelbottom=False)
+            else:
+                axes.set_xlabel("load factor" if story.still else "time (s)")
+            if column == 0:
+                axes_left.append(axes)
+            else:
+                axes.set_ylabel("")
         figure.align_ylabels(axes_left)
-        said = ["Dashed: the nominal steady state."] if any(v is not None for v in levels.values()) else []
-        if nominal.speed and "bit_angular_speed" in history:
+        said = ["Dashed: the nominal steady state."] if story.nominal.depth_of_cut is not None else []
+        if story.nominal.speed and "bit_angular_speed" in history:
             share = stick_share(time, np.asarray(history["bit_angular_speed"].values), limit)
             said.append(f"Orange: the bit sticks (below {limit:g} rad/s), {100 * share:.1f} % of the run.")
         figure.text(0.985, 1 - 62 / height, "  ".join(said), ha="right", fontsize=10.5, color=style.GREY)
         return style.save(figure, path)
 
 
+def draw_row(axes: Axes, story: Story, row: Row, time: np.ndarray, window: np.ndarray | slice) -> None:
+    """One variable over a window of time, with its nominal level."""
+    name, words, factor, unit, colour = row
+    t = time[window]
+    curve(axes, t, factor * np.asarray(story.history[name].values, dtype=float)[window], colour)
+    nominal = story.nominal
+    level = {
+        "bit_angular_speed": nominal.speed,
+        "bit_axial_speed": nominal.penetration,
+        "depth_of_cut": nominal.depth_of_cut,
+        "bit_weight": nominal.weight,
+        "bit_torque": nominal.torque,
+    }.get(name)
+    dashed: dict[str, Any] = {"color": style.VERMILION, "lw": 1.1, "ls": (0, (5, 3)), "zorder": 3}
+    if level is not None:
+        axes.axhline(factor * level, **dashed)
+    if name == "bit_depth" and nominal.penetration is not None:
+        axes.plot(t, factor * nominal.penetration * (t - time[0]), **dashed)
+    axes.set_ylabel(f"{words}\n({unit})")
+
+
+def draw_energies(axes: Axes, story: Story, names: list[str], time: np.ndarray, window: np.ndarray | slice) -> None:
+    """The energies over a window of time, in J or kJ."""
+    greatest = max(float(np.abs(story.history[n].values).max()) for n in names)
+    factor, unit = (1e-3, "kJ") if greatest > 2e3 else (1.0, "J")
+    for n, colour in zip(names, (style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.SKY), strict=False):
+        values = factor * np.asarray(story.history[n].values, dtype=float)[window]
+        curve(axes, time[window], values, colour, n.removesuffix("_energy").replace("_", " "))
+    axes.set_ylabel(f"energy\n({unit})")
+
+
 def subtitle_of_history(story: Story, time: np.ndarray) -> str:
     """Model and the time that was simulated."""
     words = [f"{story.model} model"] if story.model else []
-    words.append(
-        f"load factor {time[0]:g} to {time[-1]:.6g}" if story.still else f"{time[0]:g} to {time[-1]:.6g} s"
-    )
+    words.append(f"load factor {time[0]:g} to {time[-1]:.6g}" if story.still else f"{time[0]:g} to {time[-1]:.6g} s")
     return "   \u00b7   ".join(words)
 
 
@@ -212,9 +221,7 @@ def spectra(story: Story, path: Path) -> Path | None:
                 even, signal = evenly(time[near], values[near])
                 step = float(even[1] - even[0])
                 results.append((*amplitude_spectrum(signal, step), dominant(signal, step, n=6)))
-            for row, ((label, a, b), (frequency, amplitude, waves)) in enumerate(
-                zip(rows, results, strict=True)
-            ):
+            for row, ((label, a, b), (frequency, amplitude, waves)) in enumerate(zip(rows, results, strict=True)):
                 axes = figure.add_subplot(grid[row, column])
                 top = float(min(25.0, fastest))
                 shown = frequency <= top
@@ -296,8 +303,11 @@ def wave_speeds(story: Story) -> tuple[float | None, float | None]:
 
 
 def space_time(story: Story, path: Path) -> Path | None:
-    """space-time.png: spin and axial speed over depth and time, so that waves are seen to travel."""
-    if story.fields is None or len(story.times) < 4 or story.still:
+    """space-time.png: spin and axial speed over depth and time, so that waves are seen to travel.
+
+    None where too few poses were saved: between them waves run up and down unseen, and a picture would mislead.
+    """
+    if story.fields is None or len(story.times) < MIN_POSES or story.still:
         return None
     wanted: tuple[str, ...] = ("spin", "axial_speed")
     names = [n for n in wanted if n in story.colour_fields]
@@ -311,15 +321,15 @@ def space_time(story: Story, path: Path) -> Path | None:
     arc = story.arc - story.arc[0]
     speeds = dict(zip(("spin", "axial_speed"), wave_speeds(story), strict=True))
     coarse = float(np.median(np.diff(times)))
+    fastest = speeds.get("spin")
+    if not story.sideways and fastest and coarse > 0.25 * story.length / fastest:
+        return None
     with style.page(1600, 1200 if len(names) > 1 else 900) as figure:
         height = figure.get_size_inches()[1] * style.DPI
         note = f"one pose every {style.number(coarse)} s"
-        fastest = speeds.get("spin")
-        if fastest and coarse > 0.25 * story.length / fastest:
-            note += ": too coarse to follow a wave; save more often with output.fields_interval"
         style.heading(
             figure,
-            f"{story.title}: waves along the string",
+            f"{story.title}: along the string and over time",
             f"{subtitle_of_history(story, times)}   \u00b7   {note}",
         )
         grid = figure.add_gridspec(
@@ -346,15 +356,14 @@ def space_time(story: Story, path: Path) -> Path | None:
                 limits, colours = (middle - reach, middle + reach), "PuOr_r"
             else:
                 limits, colours = style.band(values), "cividis"
-            image = axes.pcolormesh(
-                times,
-                arc,
-                values.T,
+            image = axes.imshow(
+                even_grid(times, arc, values),
+                extent=(times[0], times[-1], arc[-1], arc[0]),
+                aspect="auto",
+                interpolation="bilinear",
                 cmap=colours,
                 vmin=limits[0],
                 vmax=limits[1],
-                shading="gouraud",
-                rasterized=True,
             )
             axes.grid(False)
             axes.set_ylim(float(arc[-1]), 0.0)
@@ -380,12 +389,17 @@ def space_time(story: Story, path: Path) -> Path | None:
             bar.outline.set_visible(False)
             if middle is not None:
                 bar.ax.axhline(middle, color=style.INK, lw=1.2)
-                bar.ax.set_title(
-                    f"nominal\n{style.number(middle, 4)}", fontsize=9, weight="normal", loc="center"
-                )
+                bar.ax.set_title(f"nominal\n{style.number(middle, 4)}", fontsize=9, weight="normal", loc="center")
             if row == len(names) - 1:
                 axes.set_xlabel("time (s)")
         return style.save(figure, path)
+
+
+def even_grid(times: np.ndarray, arc: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """`values` (time, node), linearly interpolated on even times and arc lengths: an image (arc, time)."""
+    t, s = np.linspace(times[0], times[-1], 1400), np.linspace(arc[0], arc[-1], 420)
+    along = np.stack([np.interp(s, arc, row) for row in values])
+    return np.stack([np.interp(t, times, column) for column in along.T])
 
 
 def wave_guide(axes: Axes, times: np.ndarray, length: float, speed: float) -> None:
@@ -441,9 +455,7 @@ def polar(figure: Figure, story: Story, azimuth: np.ndarray, above: np.ndarray) 
     edge = np.append(a, a[0] + 2 * np.pi)
     theta, radius = np.linspace(0, 2 * np.pi, 721), np.array([0.1, 1.0]) * 1e3 * story.bit_radius
     centre = 0.5 * (theta[1:] + theta[:-1])
-    height = np.interp(
-        centre, np.concatenate([[a[-1] - 2 * np.pi], edge]), np.concatenate([[y[-1]], y, [y[0]]])
-    )
+    height = np.interp(centre, np.concatenate([[a[-1] - 2 * np.pi], edge]), np.concatenate([[y[-1]], y, [y[0]]]))
     image = axes.pcolormesh(theta, radius, height[None], cmap="cividis", shading="flat", rasterized=True)
     for k, blade in enumerate(story.blades):
         axes.plot([blade, blade], radius, color=style.INK, lw=5, solid_capstyle="butt")
@@ -535,8 +547,6 @@ def passage(figure: Figure, story: Story, index: int) -> None:
     axes.set_ylabel("time (s)")
     axes.set_title("The rock behind a blade over time")
     box = axes.get_position()
-    bar = figure.colorbar(
-        image, cax=figure.add_axes((box.x1 + 0.012, box.y0 + 0.06, 0.012, box.height - 0.12))
-    )
+    bar = figure.colorbar(image, cax=figure.add_axes((box.x1 + 0.012, box.y0 + 0.06, 0.012, box.height - 0.12)))
     bar.set_label("rock above the bit's face (mm)")
     bar.outline.set_visible(False)

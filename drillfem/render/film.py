@@ -37,9 +37,7 @@ MILLISECONDS = 60  # per frame
 
 def film(studio: Studio, story: Story, field: str | None, path: Path) -> Path:
     """string.gif: the last stretch that was saved at the finest interval, or the whole swing."""
-    part = (
-        slice(0, len(story.times)) if story.sideways or story.still else finest_window(story.times, LONGEST)
-    )
+    part = slice(0, len(story.times)) if story.sideways or story.still else finest_window(story.times, LONGEST)
     chosen = list(range(len(story.times))[part])
     if len(chosen) > FRAMES:
         chosen = [chosen[round(k)] for k in np.linspace(0, len(chosen) - 1, FRAMES)]
@@ -117,9 +115,7 @@ def turning(
     if brush.field is not None:
         chart = place(figure, 228, y, 190, h, sharey=axes)
         everything = story.values(brush.field)[chosen]
-        chart.fill_betweenx(
-            depth, everything.min(axis=0), everything.max(axis=0), color=style.FAINT, alpha=0.55, lw=0
-        )
+        chart.fill_betweenx(depth, everything.min(axis=0), everything.max(axis=0), color=style.FAINT, alpha=0.55, lw=0)
         (line,) = chart.plot([], [], color=style.INK, lw=2.2)
         (dot,) = chart.plot([], [], "o", color=style.VERMILION, ms=7)
         lo, hi = float(everything.min()), float(everything.max())
@@ -130,9 +126,7 @@ def turning(
         marks(chart, story, depth)
         bar = place(figure, 228, y + h + 6, 190, 12)
         lo, hi = chart.get_xlim()
-        bar.imshow(
-            brush.cmap(brush.norm(np.linspace(lo, hi, 256)))[None], extent=(lo, hi, 0, 1), aspect="auto"
-        )
+        bar.imshow(brush.cmap(brush.norm(np.linspace(lo, hi, 256)))[None], extent=(lo, hi, 0, 1), aspect="auto")
         bar.set_yticks([])
         bar.grid(False)
         bar.set_xlim(lo, hi)
@@ -193,9 +187,7 @@ def _pace(story: Story, chosen: list[int]) -> str:
     if pace > 1.05:
         return f"{style.number(pace, 2)} times slower than life"
     return (
-        "as fast as life"
-        if pace > 0.95
-        else f"one pose every {style.number(step)} s: the turning between is not seen"
+        "as fast as life" if pace > 0.95 else f"one pose every {style.number(step)} s: the turning between is not seen"
     )
 
 

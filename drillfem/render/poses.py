@@ -20,7 +20,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 GHOSTS = 11
+# directors that the white stripe may follow: angle from d1, and name
+STRIPES = {0.0: "d_1", np.pi / 2: "d_2", np.pi: "-d_1", -np.pi / 2: "-d_2"}
 AXES = ("x", "y", "z")
+WORK_IN = ("work_top_drive", "work_gravity", "work_hook_load", "work_hook")
+WORK_OUT = ("work_bit", "dissipated", "work_damping", "work_wall")
 
 
 @dataclass(frozen=True)
@@ -57,7 +61,7 @@ def find_view(story: Story, width: int, tallest: int, room: float) -> tuple[View
     width: of the frame in pixels; tallest: its greatest height; room: kept free around the string, m.
     The height that the poses need is returned with the view.
     """
-    points = story.position.reshape(-1, 3)
+    points = np.concatenate([story.position.reshape(-1, 3), way_of_tip(story)])
     ground = None
     spread = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
     flat = bool(spread[1][2] < 2e-3 * spread[1][0])
@@ -77,11 +81,7 @@ def find_view(story: Story, width: int, tallest: int, room: float) -> tuple[View
     else:
         start = story.position[0]
         plane = np.linalg.svd(start - start.mean(axis=0), full_matrices=False)
-        up = (
-            _axis_like(plane[2][2])
-            if plane[1][1] > 1e-3 * plane[1][0]
-            else -gravity / np.linalg.norm(gravity)
-        )
+        up = _axis_like(plane[2][2]) if plane[1][1] > 1e-3 * plane[1][0] else -gravity / np.linalg.norm(gravity)
         move = (points @ up)[np.argmax(np.abs((points - start[0]) @ up))] - start[0] @ up
         up = up if move >= 0 else -up
         ahead = start[-1] - start[0]
@@ -148,11 +148,12 @@ def ghost_tones(count: int) -> list[tuple[float, ...]]:
 
 
 def stripe_towards(pose: Pose, view: View) -> float:
-    """Angle from d1 of the painted stripe: 0, or that of +-d2 where the view hides d1."""
-    if (pose.director1 @ view.near).mean() > 0.3:
+    """Angle from d1 of the painted stripe: 0, or where the view hides d1 that of -d1 or +-d2."""
+    d1, d2 = pose.director1 @ view.near, np.cross(pose.director3, pose.director1) @ view.near
+    if d1.min() > 0.3:
         return 0.0
-    d2 = np.cross(pose.director3, pose.director1)
-    return float(np.copysign(np.pi / 2, (d2 @ view.near).mean()))
+    facing = {angle: side.min() + side.mean() for angle, side in zip(STRIPES, (d1, d2, -d1, -d2), strict=True)}
+    return max(facing, key=lambda angle: facing[angle])
 
 
 def thickness(story: Story, view: View, height: int, least: float = 9.0) -> float:
@@ -200,7 +201,7 @@ def poses_page(studio: Studio, story: Story, field: str | None, index: int, path
         figure.text(
             0.018,
             0.018,
-            f"Coloured: the chosen pose, its white stripe along the director $d_{2 if brush.stripe else 1}$. "
+            f"Coloured: the chosen pose, its white stripe along ${STRIPES[brush.stripe]}$ (director). "
             "Grey: other saved poses, darker is later. "
             "Dotted: the way of the tip.",
             fontsize=10,
@@ -231,14 +232,17 @@ def _signed(sign: int) -> Callable[[float, object], str]:
     return lambda value, _: style.number(round(sign * value, 9) + 0.0, 4)
 
 
+def way_of_tip(story: Story) -> np.ndarray:
+    """Positions of the lower end (m, 3)."""
+    if all(f"tip_{k}" in story.history for k in AXES):
+        return np.stack([np.asarray(story.history[f"tip_{k}"].values, dtype=float) for k in AXES], axis=1)
+    return story.position[:, -1]
+
+
 def tip_way(axes: Axes, story: Story, view: View) -> None:
     """The path of the lower end, from the history where it has it, else through the saved poses."""
-    if all(f"tip_{k}" in story.history for k in AXES):
-        way = np.stack([story.history[f"tip_{k}"].values for k in AXES], axis=1)
-    else:
-        way = story.position[:, -1]
-    page = view.project(way)
-    axes.plot(page[:, 0], page[:, 1], color=style.VERMILION, lw=1.5, ls=(0, (1, 2)), zorder=4)
+    page = view.project(way_of_tip(story))
+    axes.plot(page[:, 0], page[:, 1], color=style.VERMILION, lw=1.3, ls=(0, (1, 2)), zorder=4)
 
 
 def label_ghosts(axes: Axes, story: Story, view: View, behind: Sequence[int], index: int) -> None:
@@ -301,15 +305,11 @@ def find_floor(story: Story, up: np.ndarray) -> Floor | None:
     i, j = (n for n in range(3) if n != k)
     locator = MaxNLocator(5, steps=[1, 2, 5, 10])
     room = 1e-3 * story.length
-    a, b = (
-        np.asarray(locator.tick_values(points[:, n].min() - room, points[:, n].max() + room)) for n in (i, j)
-    )
+    a, b = (np.asarray(locator.tick_values(points[:, n].min() - room, points[:, n].max() + room)) for n in (i, j))
     return Floor(i, j, k, a, b, float(points[:, k].min() if up[k] > 0 else points[:, k].max()))
 
 
-def draw_floor(
-    axes: Axes, story: Story, view: View, ground: Floor, pose: Pose, behind: Sequence[int]
-) -> None:
+def draw_floor(axes: Axes, story: Story, view: View, ground: Floor, pose: Pose, behind: Sequence[int]) -> None:
     """The floor with its scales, and the string's shadow on it."""
     i, j, k, a, b, level = ground.i, ground.j, ground.k, ground.a, ground.b, ground.level
 
@@ -440,9 +440,7 @@ def beside(figure: Figure, story: Story, brush: Brush, index: int, height: int) 
             axes.set_title("Tip position (m)")
             axes.margins(x=0, y=0.2)
             axes.set_xlabel("load factor" if story.still else "time (s)")
-            axes.legend(
-                loc="lower right", bbox_to_anchor=(1.02, 0.98), ncols=3, handlelength=1.4, columnspacing=1.2
-            )
+            axes.legend(loc="lower right", bbox_to_anchor=(1.02, 0.98), ncols=3, handlelength=1.4, columnspacing=1.2)
         else:
             time = story.history["time"].values
             total = np.zeros(len(time))
@@ -451,15 +449,20 @@ def beside(figure: Figure, story: Story, brush: Brush, index: int, height: int) 
                 total = total + values
                 if not (story.still and energy == "kinetic_energy"):
                     axes.plot(time, values, color=colour, label=energy.removesuffix("_energy"))
-            if len(energies) > 1 and not story.still:
-                axes.plot(time, total, color=style.INK, lw=1, ls=(0, (5, 3)), label="sum")
+            fed, lost = (
+                sum(
+                    (np.asarray(story.history[n].values, dtype=float) for n in names if n in story.history),
+                    np.zeros(len(time)),
+                )
+                for names in (WORK_IN, WORK_OUT)
+            )
+            if len(energies) > 1 and not story.still and np.ptp(fed - lost) > 0:
+                axes.plot(time, total[0] + fed - lost, color=style.INK, lw=1, ls=(0, (5, 3)), label="work put in")
             axes.axvline(float(story.times[index]), color=style.GREY, lw=1, ls=(0, (4, 3)))
             axes.set_title("Energy (J)")
             axes.margins(x=0, y=0.2)
             axes.set_xlabel("load factor" if story.still else "time (s)")
-            axes.legend(
-                loc="lower right", bbox_to_anchor=(1.02, 0.98), ncols=3, handlelength=1.4, columnspacing=1.2
-            )
+            axes.legend(loc="lower right", bbox_to_anchor=(1.02, 0.98), ncols=3, handlelength=1.4, columnspacing=1.2)
 
 
 def true_poses_page(studio: Studio, story: Story, field: str | None, index: int, path: Path) -> Path:
@@ -479,7 +482,7 @@ def true_poses_page(studio: Studio, story: Story, field: str | None, index: int,
         if not given:
             words += "   \u00b7   no diameter given: thickness chosen"
         style.heading(figure, f"{story.title}: true proportions", words)
-        axes = place(figure, x, y, w, h)
+        axes = place(figure, x, y + (960 - h) // 2, w, h)
         if view.floor is not None:
             draw_floor(axes, story, view, view.floor, pose, [])
         line = view.project(pose.position)
@@ -488,9 +491,7 @@ def true_poses_page(studio: Studio, story: Story, field: str | None, index: int,
         dress(axes, view)
         bend = np.linalg.norm(np.gradient(pose.director3, pose.arc, axis=0), axis=1)
         inner = slice(len(bend) // 8, -len(bend) // 8 or None)
-        middle = (
-            int(np.argmax(bend[inner])) + (inner.start or 0) if np.ptp(bend[inner]) > 1e-9 else len(bend) // 2
-        )
+        middle = int(np.argmax(bend[inner])) + (inner.start or 0) if np.ptp(bend[inner]) > 1e-9 else len(bend) // 2
         size = (330, 290)
         half = 5.0 * radii(story)
         spots = (
@@ -500,9 +501,7 @@ def true_poses_page(studio: Studio, story: Story, field: str | None, index: int,
         )
         for k, (name, node) in enumerate(spots):
             centre = pose.position[node]
-            close = Camera(
-                tuple(centre + 50 * half * view.near), tuple(centre), tuple(view.up), half_height=half
-            )
+            close = Camera(tuple(centre + 50 * half * view.near), tuple(centre), tuple(view.up), half_height=half)
             frame = place(figure, 1180, 130 + k * 325, *size)
             style.panel(frame)
             for spine in frame.spines.values():
@@ -524,9 +523,7 @@ def true_poses_page(studio: Studio, story: Story, field: str | None, index: int,
             u, v = view.project(centre)
             wide = half * size[0] / size[1]
             axes.add_patch(
-                Rectangle(
-                    (u - wide, v - half), 2 * wide, 2 * half, fill=False, ec=style.VERMILION, lw=1.3, zorder=8
-                )
+                Rectangle((u - wide, v - half), 2 * wide, 2 * half, fill=False, ec=style.VERMILION, lw=1.3, zorder=8)
             )
             for sign, corner in ((1, 1.0), (-1, 0.0)):
                 start = axes.transData.transform((u + wide, v + sign * half))

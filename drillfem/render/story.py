@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 # the field a viewer wants to see first, if it is there
-FIRST_CHOICE = ("spin", "axial_force", "torque", "curvature", "bending_moment", "axial_speed", "speed")
+FIRST_CHOICE = ("spin", "axial_force", "torque", "bending_moment", "curvature", "axial_speed")
 # names that a result may use for the same thing
 ALIASES = {"arc_length": ("s",), "position": ("r",), "director1": ("d1",), "director3": ("d3",)}
 NOT_COLOURS = {"arc_length", "outer_diameter", "inner_diameter"}
@@ -105,7 +105,7 @@ class Story:
         speed = attribute(self.scene, "top_drive", "speed")
         values: dict[str, float | None] = {"speed": float(speed) if speed else None}
         compute = getattr(self.scene, "nominal", None)
-        if attribute(self.scene, "bit") is not None and callable(compute):
+        if attribute(self.scene, "bit", "kind") == "cutting" and callable(compute):
             try:
                 state = compute()
             except (ValueError, SceneError):
@@ -162,9 +162,7 @@ class Story:
         if self.fields is None:
             return []
         names = [
-            str(n)
-            for n, v in self.fields.data_vars.items()
-            if v.dims == ("time", "node") and n not in NOT_COLOURS
+            str(n) for n, v in self.fields.data_vars.items() if v.dims == ("time", "node") and n not in NOT_COLOURS
         ]
         return sorted(names)
 
@@ -178,7 +176,8 @@ class Story:
             return wanted
         usable = [n for n in names if np.isfinite(self.values(n)).any()]
         telling = [n for n in usable if np.ptp(self.values(n)) > 1e-9 * (1 + np.abs(self.values(n)).max())]
-        choice = ("axial_force", "curvature", "bending_moment", *FIRST_CHOICE) if self.still else FIRST_CHOICE
+        bent = ("bending_moment", "curvature")
+        choice = (*bent, *FIRST_CHOICE) if self.sideways else FIRST_CHOICE
         for pool in (telling, usable):
             for name in choice:
                 if name in pool:
@@ -199,9 +198,7 @@ class Story:
         first, last = float(self.times[0]), float(self.times[-1])
         room = 1e-6 + 1e-9 * abs(last)
         if not (first - room <= wanted <= last + room):
-            raise SceneError(
-                f"no picture at time {wanted:g} s: the saved poses go from {first:g} s to {last:g} s"
-            )
+            raise SceneError(f"no picture at time {wanted:g} s: the saved poses go from {first:g} s to {last:g} s")
         return int(np.argmin(np.abs(self.times - wanted)))
 
     def values(self, name: str) -> np.ndarray:

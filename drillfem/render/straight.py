@@ -164,9 +164,7 @@ def stretched_view(
     return studio.shoot(things, camera, width, height)
 
 
-def ground(
-    axes: Axes, half: float, hole: float, surface: float, bottom: float, low: float, high: float
-) -> None:
+def ground(axes: Axes, half: float, hole: float, surface: float, bottom: float, low: float, high: float) -> None:
     """Rock left and right of the hole and under it, the sky above: the set behind the string."""
     layers = strata(500, 220)
     share = (high - surface) / (high - low)
@@ -175,9 +173,7 @@ def ground(
     x = np.linspace(-1, 1, 200)
     wall = np.sqrt(1 - x**2) * 0.35 + 0.28  # the far wall of an empty hole, darker at its edges
     shade = np.repeat(wall[None, :, None], 2, axis=0) * np.array([0.74, 0.66, 0.56])
-    axes.imshow(
-        shade, extent=(-hole, hole, bottom, surface), aspect="auto", interpolation="bilinear", zorder=1
-    )
+    axes.imshow(shade, extent=(-hole, hole, bottom, surface), aspect="auto", interpolation="bilinear", zorder=1)
     axes.axhline(surface, color="#5d5140", lw=1.5, zorder=1.5)
     axes.set_xlim(-half, half)
     axes.set_ylim(high, low)
@@ -292,9 +288,7 @@ def profiles(
         axes.tick_params(labelbottom=False, length=0)
         axes.legend(loc="upper right", bbox_to_anchor=(1.02, 1.0), handlelength=1.2, borderpad=0.2)
         bar = place(figure, where[0], where[1] + where[3] + 8, where[2], 16)
-        bar.imshow(
-            brush.cmap(brush.norm(np.linspace(lo, hi, 256)))[None], extent=(lo, hi, 0, 1), aspect="auto"
-        )
+        bar.imshow(brush.cmap(brush.norm(np.linspace(lo, hi, 256)))[None], extent=(lo, hi, 0, 1), aspect="auto")
         bar.set_yticks([])
         bar.grid(False)
         bar.set_xlim(lo, hi)
@@ -321,9 +315,7 @@ def marks(axes: Axes, story: Story, depth: np.ndarray) -> None:
 
 
 # -- close-ups -------------------------------------------------------------------------------------------
-def insets(
-    figure: Figure, studio: Studio, story: Story, brush: Brush, index: int, pose: Pose, whole: Axes
-) -> None:
+def insets(figure: Figure, studio: Studio, story: Story, brush: Brush, index: int, pose: Pose, whole: Axes) -> None:
     """Top drive, the change of section, and the bit on its rock, each with what is measured there."""
     x, y, across = 872, 128, 420
     heights = {"top": 240, "junction": 240, "bit": 400} if len(story.parts) > 1 else {"top": 380, "bit": 540}
@@ -405,9 +397,7 @@ def top_inset(
         (0.0, 0.0),
     ]
     things.append(Thing(lathe(motor), DARK_STEEL, specular=0.5))
-    things.append(
-        Thing(lathe([(1.9 * width, -0.9 * width), (1.9 * width, -0.35 * width)]), ARROW, specular=0.2)
-    )
+    things.append(Thing(lathe([(1.9 * width, -0.9 * width), (1.9 * width, -0.35 * width)]), ARROW, specular=0.2))
     for side in (-1, 1):
         things.append(
             Thing(
@@ -614,17 +604,13 @@ def true_page(studio: Studio, story: Story, field: str | None, index: int, path:
             )
             if before is not None:
                 outer = before
-                frame = Rectangle(
-                    (-half, low), 2 * half, high - low, fill=False, ec=style.VERMILION, lw=1.4, zorder=8
-                )
+                frame = Rectangle((-half, low), 2 * half, high - low, fill=False, ec=style.VERMILION, lw=1.4, zorder=8)
                 outer.add_patch(frame)
                 for level, corner in ((low, 1.0), (high, 0.0)):
                     start = outer.transData.transform((half, level))
                     stop = axes.transAxes.transform((0.0, corner))
                     ends = figure.transFigure.inverted().transform([start, stop])
-                    figure.add_artist(
-                        Line2D(ends[:, 0], ends[:, 1], color=style.VERMILION, lw=1.0, alpha=0.55)
-                    )
+                    figure.add_artist(Line2D(ends[:, 0], ends[:, 1], color=style.VERMILION, lw=1.0, alpha=0.55))
             before = axes
         if brush.field is not None:
             bar = place(figure, 96, 1118, 420, 16)

@@ -154,6 +154,10 @@ def surface(points: np.ndarray, normals: np.ndarray, closed: bool, uv: np.ndarra
         columns += 1
     index = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
+    # VTK lights the side from which a face runs counter-clockwise: let that be the side of the normals
+    across = np.cross(points[1:, 1:] - points[:-1, :-1], points[1:, :-1] - points[:-1, 1:])
+    if np.sum(across * normals[:-1, :-1]) < 0:
+        b, d = d, b
     faces = np.stack([np.full(a.size, 4), a.ravel(), b.ravel(), c.ravel(), d.ravel()], axis=1)
     mesh = pyvista.PolyData(points.reshape(-1, 3), faces.ravel())
     mesh.point_data.set_array(normals.reshape(-1, 3).astype(np.float32), "Normals")
@@ -181,9 +185,7 @@ def resample(pose: Pose, arc: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     return position, d1, d3
 
 
-def tube(
-    position: np.ndarray, d1: np.ndarray, d3: np.ndarray, radius: np.ndarray, v: np.ndarray
-) -> list[Any]:
+def tube(position: np.ndarray, d1: np.ndarray, d3: np.ndarray, radius: np.ndarray, v: np.ndarray) -> list[Any]:
     """Skin and the two end discs of a tube with rings of `radius` (m,) around `position` (m, 3).
 
     Texture coordinates: u = angle / 2 pi from d1 about d3, v (m,) as given. Where neighbouring rings differ
@@ -291,9 +293,7 @@ def strata(rows: int, columns: int, seed: int = 5) -> np.ndarray:
     rng = np.random.default_rng(seed)
     depth = np.linspace(0, 1, rows)[:, None]
     across = np.linspace(0, 1, columns)[None, :]
-    bend = 0.012 * np.sin(2 * math.pi * (0.7 * across + 0.1)) + 0.006 * np.sin(
-        2 * math.pi * (1.9 * across + 0.4)
-    )
+    bend = 0.012 * np.sin(2 * math.pi * (0.7 * across + 0.1)) + 0.006 * np.sin(2 * math.pi * (1.9 * across + 0.4))
     level = depth + bend
     tone = np.zeros((rows, columns))
     for wave in (7, 13, 29, 61):
@@ -333,9 +333,7 @@ def _bit_parts(radius: float, blades: tuple[float, ...]) -> list[Thing]:
         lead = np.array([-math.sin(phi), math.cos(phi), 0.0])  # the way it turns
         out = np.array([math.cos(phi), math.sin(phi), 0.0])
         # side view of a fin in (outward, down); the leading face lies in the plane of the blade's azimuth
-        outline = (
-            np.array([(0.10, -0.18), (0.10, 0.0), (0.99, 0.0), (1.0, -0.05), (1.0, -0.85), (0.55, -1.22)]) * a
-        )
+        outline = np.array([(0.10, -0.18), (0.10, 0.0), (0.99, 0.0), (1.0, -0.05), (1.0, -0.85), (0.55, -1.22)]) * a
         front = outline[:, :1] * out + outline[:, 1:] * np.array([0, 0, 1.0])
         back = front - thick * lead
         n = len(outline)
@@ -346,9 +344,7 @@ def _bit_parts(radius: float, blades: tuple[float, ...]) -> list[Thing]:
         fins.append(pyvista.PolyData(np.vstack([front, back]), faces).triangulate())
         for place in (0.26, 0.44, 0.62, 0.80, 0.93):
             centre = place * a * out + np.array([0, 0, -0.085 * a]) + 0.012 * a * lead
-            disc = pyvista.Cylinder(
-                center=centre, direction=lead, radius=0.075 * a, height=0.05 * a, resolution=24
-            )
+            disc = pyvista.Cylinder(center=centre, direction=lead, radius=0.075 * a, height=0.05 * a, resolution=24)
             cutters.append(disc.triangulate())
     if fins:
         things.append(Thing(join(fins), BRASS, specular=0.4))

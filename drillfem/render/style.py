@@ -113,9 +113,5 @@ def number(value: float, digits: int = 3) -> str:
     text = f"{value:.{digits}g}"
     if "e" in text:
         mantissa, exponent = text.split("e")
-        text = (
-            f"{float(text):,.0f}".replace(",", "\u2009")
-            if 0 < int(exponent) < 7
-            else f"{mantissa}e{int(exponent)}"
-        )
+        text = f"{float(text):,.0f}".replace(",", "\u2009") if 0 < int(exponent) < 7 else f"{mantissa}e{int(exponent)}"
     return text.replace("-", "\u2212")

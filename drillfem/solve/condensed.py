@@ -390,7 +390,7 @@ def _substep(
     turn_free = yf - s[SWING] * acceleration - s[PHI] + turned
 
     smooth = s[CONTACT] > 0.0 and _cut_smoothly(par, surface, ca, ct, s, uf, vf, wf_, turn_free, work, out)
-    if kind == 0 and not (smooth and out[9] == s[WEAR] and (out[9] == 0.0 or out[9] == 1.0)):
+    if kind == 0 and not (smooth and out[9] == s[WEAR]):
         return False
     momentum0 = position0 = 0.0
     if acceleration != 0.0:
@@ -490,7 +490,8 @@ def _march(
             # the frame turns with the top: the static answer to its acceleration is kept out of the modes
             modes[2, : table.shape[1]] += table[STILL] * (acceleration - s[ACC])
             s[ACC] = acceleration
-        if s[CONTACT] == 0.0 or not _substep(
+        steady = s[CONTACT] > 0.0 and (s[WEAR] == 0.0 or s[WEAR] == 1.0)
+        if not steady or not _substep(
             par, surface, axial, torsion, 0, modes, spare, s, step, angle1, speed1, work, out
         ):
             angle0, speed0 = s[TOP], s[TOP_SPEED]

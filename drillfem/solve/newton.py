@@ -163,6 +163,9 @@ class BitCoupledNewton:
         self._f = self._matrix.createVecLeft()
         self._y = self._matrix.createVecRight()
         self._residual = self._matrix.createVecLeft()
+        # some integrators scale the matrix they ask for: when only the shift is wanted, this one
+        self._decoy = PETSc.Mat().createConstantDiagonal(self._matrix.getSizes(), 1.0, comm=self._matrix.comm)
+        self._decoy.assemble()
 
     def _quaternions(self) -> Array:
         return self._stage.reshape(-1, 13)[:, 3:7]
@@ -244,7 +247,7 @@ class BitCoupledNewton:
             snes.computeFunction(x, f)
             if iteration == 0:
                 self.only_shift = True
-                snes.computeJacobian(x, self._matrix)
+                snes.computeJacobian(x, self._decoy)
                 self.only_shift = False
                 if abs(self.shift - self._factored_shift) > 1e-10 * self.shift:
                     self._renew = True

@@ -112,6 +112,8 @@ class Statics:
         ksp = snes.getKSP()
         ksp.setType(PETSc.KSP.Type.PREONLY)
         ksp.getPC().setType(PETSc.PC.Type.LU)
+        # pivoting: the rows of a virtual rotation and the columns of a quaternion do not match on the diagonal
+        ksp.getPC().setFactorSolverType("mumps")
         x = matrix.createVecRight()
         x.setArray(x0)
         iterations, steps, reached = 0, 0, 0.0

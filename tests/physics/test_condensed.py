@@ -65,3 +65,223 @@ def c1_string(
     u, twist = string.nominal()
     string.reset(u, np.full(len(s), cut * SPEED / (2 * np.pi)), twist, SPEED * (1 + spin * s / s[-1]))
     return string
+
+
+def lumped(blades, step, surface, friction=0.3, weight=7.0, spin=0.0):
+    """M1 in the units of appendix C.2: psi = 50, lambda = 5, omega_0 = 5, W = d + lambda g, T = d + beta lambda g."""
+    law = BitLaw(
+        specific_energy=0.5, contact_strength=2.5, contact_strength_stalled=2.5, radius=2.0, wear_flat_length=1.0,
+        inclination=1.0, friction=friction, blades=blades,
+        axial_regularisation=0.0, torsional_regularisation=0.0, cutting_regularisation=0.0,
+    )  # fmt: skip
+    cut = law.depth_of_cut(weight)
+    rock = RockSurface(*surface[:1], blades, incline=-cut / (2 * np.pi), **surface[1])
+    axial = Channel(np.array([[1 / 50.0]]), np.zeros((1, 1)), np.zeros((1, 1)), 0, 0, np.array([weight]))
+    spring = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    torsion = Channel(np.diag([0.0, 1.0]), 0 * spring, spring, 1, 0)
+    string = CondensedString(axial, torsion, law, rock, step, hook_load=0.0, top=5.0)
+    u, twist = string.nominal()
+    string.reset(u, np.array([cut * 5.0 / (2 * np.pi)]), twist, np.array([5.0, 5.0 * (1 + spin)]))
+    return string
+
+
+def test_natural_frequencies_of_the_string():
+    axial, torsion = c1_string(1e-3).frequencies
+    np.testing.assert_allclose(axial[:9], [0, 1.69, 4.02, 6.49, 8.96, 11.28, 12.97, 14.66, 16.99], atol=0.006)
+    published = [0.4534, 1.7108, 3.1781, 4.6768, 6.1440, 7.4014, 8.3083, 9.5657, 11.0329, 12.5316]
+    np.testing.assert_allclose(torsion[:10], published, atol=6e-5)
+
+
+@pytest.mark.parametrize("surface", [("dg", {"degree": 2, "elements": 16}), ("profile", {})])
+def test_growth_of_the_self_excitation(surface):
+    """Linear anchor of the lumped model, n = 4: 2.79763 + 14.66778 i."""
+    string = lumped(4, 1e-3, surface, spin=1e-6)
+    h = string.advance(4000)
+    y = h["bit_axial_speed"][2000:] - 2.0 * 5.0 / (2 * np.pi)
+    assert np.abs(y).max() < 0.1
+    y, order = y[::20], 8
+    columns = np.lib.stride_tricks.sliding_window_view(y, order + 1)
+    coefficients = np.linalg.lstsq(columns[:, :-1], columns[:, -1], rcond=None)[0]
+    rates = np.log(np.roots(np.append(1.0, -coefficients[::-1])).astype(complex)) / 0.02
+    assert np.abs(rates - (2.79763 + 14.66778j)).min() < 2e-4
+
+
+@pytest.mark.parametrize("blades, top, ratio", [(4, 10.918, 1.132), (6, 10.030, 1.0386)])
+def test_stick_slip_of_the_lumped_model(blades, top, ratio):
+    """field.md 3.5, beta = 0.3, statistics on 200-250: largest speed and rate of penetration over the nominal one."""
+    string = lumped(blades, 2e-3, ("profile", {}), spin=0.1)
+    h = string.advance(125_000)
+    late = h["time"] >= 200
+    assert h["bit_angular_speed"][late].max() == pytest.approx(top, rel=0.01)
+    depth = h["bit_depth"][late]
+    assert (depth[-1] - depth[0]) / 50.0 / (10.0 / (2 * np.pi)) == pytest.approx(ratio, abs=0.012)
+
+
+@pytest.mark.parametrize("scheme", ["dg", "profile"])
+def test_second_order_in_the_step(scheme):
+    def run(step):
+        h = c1_string(1e-4, step=step, scheme=scheme).advance(round(1.2 / step), round(4e-3 / step))
+        return np.stack([h["bit_angle"], h["bit_depth"], h["bit_torque"]])
+
+    steps = np.array([4e-3, 2e-3, 1e-3])
+    exact = run(1.25e-4)
+    errors = np.array([np.abs(run(h) - exact).max(axis=1) for h in steps])
+    for quantity, size in zip(errors.T, (1e-6, 1e-7, 0.3), strict=True):
+        assert np.polyfit(np.log(steps), np.log(quantity), 1)[0] > 1.8
+        assert quantity[-1] < size
+
+
+@pytest.mark.parametrize("retardation, divided", [(1e-2, False), (1e-4, True), (1e-5, True)])
+def test_energy_closes(retardation, divided):
+    string = c1_string(retardation, spin=0.5)
+    h = string.advance(20_000)
+    assert (string.counters["divided"] > 0) == divided
+    turnover = h["work_top_drive"][-1] + h["work_gravity"][-1]
+    assert np.abs(energy_imbalance(h)).max() < 1e-6 * turnover
+    assert h["dissipated"][-1] > 0 and np.diff(h["dissipated"]).min() > -1e-6
+    # what the cutting forces do is the specific energy of the rock that is gone
+    assert h["work_cutting"][-1] == pytest.approx(0.252e9 * h["rock_volume"][-1], rel=5e-3)
+
+
+def test_energy_closes_with_a_moving_top_drive():
+    """Top motion of case C3 (5-49): its acceleration jumps at t = 2 s."""
+
+    def top(t):
+        late = np.maximum(t - 2.0, 0.0)
+        angle = SPEED * t + np.cos(2 * late) + 0.2 * np.cos(10 * late) - 1.2
+        return angle, SPEED - 2 * np.sin(2 * late) - 2 * np.sin(10 * late)
+
+    errors = []
+    for step in (2e-3, 1e-3):
+        h = c1_string(1e-2, step=step, spin=0.0, top=top).advance(round(6 / step))
+        errors.append(np.abs(energy_imbalance(h)).max() / h["work_top_drive"][-1])
+        start = h["time"] < 2.0
+        np.testing.assert_allclose(h["bit_angular_speed"][start], SPEED, rtol=1e-9)
+        assert np.ptp(h["bit_angular_speed"]) > 2
+    assert errors[1] < 2e-6 and errors[0] > 3 * errors[1]
+
+
+def test_steady_drilling_stays_steady():
+    h = c1_string(1e-2, spin=0.0).advance(2000)
+    np.testing.assert_allclose(h["bit_angular_speed"], SPEED, rtol=1e-10)
+    np.testing.assert_allclose(h["bit_weight"], WEIGHT_ON_BIT, rtol=1e-9)
+    np.testing.assert_allclose(h["top_torque"], 3264.04, rtol=1e-5)
+    np.testing.assert_allclose(h["bit_depth"], 2.89389e-3 * h["time"], rtol=2e-6)
+
+
+def test_coupled_damping_agrees_with_modal_damping_and_closes():
+    """Two retardation times couple the modes; nearly equal ones must give what equal ones give."""
+    small = {"elements": (10, 3), "step": 1e-3, "spin": 0.3}
+    equal = c1_string(1e-3, **small).advance(1500)
+    near = c1_string(1e-3, collar_retardation=1e-3 * (1 + 1e-7), **small).advance(1500)
+    for name in ("bit_angle", "bit_depth", "bit_torque", "dissipated", "top_torque"):
+        np.testing.assert_allclose(near[name], equal[name], rtol=1e-6, atol=1e-6 * np.abs(equal[name]).max())
+    other = c1_string(1e-4, collar_retardation=1e-2, **small).advance(1500)
+    assert np.abs(energy_imbalance(other)).max() < 1e-9 * other["work_top_drive"][-1]
+    assert np.abs(other["bit_torque"] - equal["bit_torque"]).max() > 1.0
+
+
+def test_chunks_and_checkpoints_repeat_to_the_bit():
+    for scheme in ("dg", "profile"):
+        whole = c1_string(1e-5, scheme=scheme, spin=0.6).advance(3000, 7)
+        first = c1_string(1e-5, scheme=scheme, spin=0.6)
+        a = first.advance(1234, 7)
+        second = c1_string(1e-5, scheme=scheme, spin=0.6)
+        second.load(first.state_dict())
+        b = second.advance(3000 - 1234, 7)
+        for name, values in whole.items():
+            np.testing.assert_array_equal(np.concatenate([a[name], b[name]]), values, err_msg=name)
+
+
+def test_fields_belong_to_the_outputs():
+    string = c1_string(1e-5, spin=0.6)
+    h = string.advance(2345)
+    fields, mass = string.fields(), string.torsion.mass
+    assert fields["angle"][-1] == pytest.approx(h["bit_angle"][-1], rel=1e-12)
+    assert fields["angular_speed"][-1] == pytest.approx(h["bit_angular_speed"][-1], rel=1e-9)
+    assert fields["axial_speed"][-1] == pytest.approx(h["bit_axial_speed"][-1], rel=1e-9)
+    kinetic = fields["angular_speed"] @ mass @ fields["angular_speed"] / 2
+    kinetic += fields["axial_speed"] @ string.axial.mass @ fields["axial_speed"] / 2
+    assert kinetic == pytest.approx(h["kinetic_energy"][-1], rel=1e-10)
+    strain = fields["angle"] @ string.torsion.stiffness @ fields["angle"] / 2
+    strain += fields["displacement"] @ string.axial.stiffness @ fields["displacement"] / 2
+    assert strain == pytest.approx(h["strain_energy"][-1], rel=1e-8)
+    gravity = string.axial.load @ (fields["displacement"] - string.nominal()[0])
+    assert gravity == pytest.approx(h["work_gravity"][-1], rel=1e-8)
+
+
+def test_one_free_mode_is_exact():
+    """A bit off bottom: modes swing freely, whatever the step."""
+    for step in (1e-3, 0.05):
+        string = lumped(4, step, ("profile", {}))
+        string.reset(np.array([0.0]), np.array([-50.0]), np.zeros(2), np.array([5.0, 9.0]))
+        h = string.advance(round(0.2 / step))
+        t = h["time"]
+        assert h["bit_torque"].max() == 0
+        np.testing.assert_allclose(h["bit_angle"], 5 * t + 4 * np.sin(t), atol=1e-12)
+        np.testing.assert_allclose(h["bit_depth"], -50 * t + 0.5 * 350 * t**2, atol=1e-11)
+
+
+def test_a_stuck_bit_does_not_ring():
+    """Without division, modes beyond the sampling rate answer a sticking bit with the wrong sign (known wrong way)."""
+
+    def rattle(parts):
+        string = c1_string(1e-5, spin=0.6)
+        string = CondensedString(
+            string.axial, string.torsion, string.law, string.surface, 1e-3, hook_load=string.hook_load, top=SPEED, parts=parts
+        )
+        u, twist = string.nominal()
+        s = np.linspace(0, 1, len(u))
+        string.reset(u, np.full(len(u), 2.89389e-3), twist, SPEED * (1 + 0.6 * s))
+        v = string.advance(40_000)["bit_axial_speed"][20_000:]
+        power = np.abs(np.fft.rfft(v - v.mean())) ** 2
+        return power[np.fft.rfftfreq(len(v), 1e-3) > 450].sum() / power.sum()
+
+    assert c1_string(1e-5).parts == 2
+    assert rattle(None) < 0.02 < 10 * rattle(None) < rattle(1)
+
+
+def spectrum(history, name, window):
+    some = (history["time"] > window[0]) & (history["time"] <= window[1])
+    y = history[name][some]
+    y = y - y.mean()
+    return np.fft.rfftfreq(len(y), history["time"][1] - history["time"][0]), 2 * np.abs(np.fft.rfft(y)) / len(y)
+
+
+def peak(history, name, window, low=0.2, high=60.0):
+    f, amplitude = spectrum(history, name, window)
+    some = (f > low) & (f < high)
+    k = np.argmax(amplitude[some])
+    return f[some][k], amplitude[some][k]
+
+
+def test_case_cd2_decays():
+    h = c1_string(1e-2).advance(60_000, 10)
+    end = h["time"] > 40
+    assert h["bit_torque"][end].mean() == pytest.approx(3264, abs=2)
+    assert np.ptp(h["bit_angular_speed"][end]) < 0.25 * np.ptp(h["bit_angular_speed"][h["time"] < 20])
+    assert peak(h, "bit_angular_speed", (40, 60))[0] == pytest.approx(0.45, abs=0.03)
+
+
+def test_case_cd3_locks_axially():
+    h = c1_string(1e-3).advance(200_000, 5)
+    assert peak(h, "bit_axial_speed", (90, 110))[0] == pytest.approx(13.12, abs=0.06)
+    assert peak(h, "bit_axial_speed", (180, 200))[0] == pytest.approx(13.1, abs=0.06)
+    torsion = [peak(h, "bit_angular_speed", w, high=1.0)[1] for w in ((0, 20), (90, 110), (180, 200))]
+    assert torsion[0] > 3 * torsion[1] > 6 * torsion[2]
+
+
+def test_case_cd4_keeps_swinging_without_stick():
+    h = c1_string(1e-4).advance(200_000, 5)
+    assert peak(h, "bit_axial_speed", (0, 20))[0] == pytest.approx(13.1, abs=0.1)
+    assert peak(h, "bit_angular_speed", (90, 110), 1.0)[0] == pytest.approx(3.2, abs=0.06)
+    assert peak(h, "bit_angular_speed", (180, 200), high=1.0)[1] > 0.5
+    assert h["bit_angular_speed"].min() > 5.0
+
+
+def test_case_cd5_sticks_and_slips():
+    h = c1_string(1e-5).advance(200_000, 5)
+    late = h["time"] > 100
+    assert peak(h, "bit_angular_speed", (180, 200), 10.0)[0] == pytest.approx(16.16, abs=0.06)
+    assert h["bit_angular_speed"][late].min() < 0.05 and h["bit_angular_speed"].max() > 28
+    assert h["bit_torque"][h["time"] > 195].mean() == pytest.approx(3300, rel=0.04)

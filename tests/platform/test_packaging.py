@@ -47,13 +47,9 @@ def test_wheel_has_files_where_the_checkout_has_links(project: Path, tmp_path: P
         assert (CHECKOUT / "drillfem" / name).is_symlink()
         assert (CHECKOUT / "drillfem" / name).resolve() == CHECKOUT / target
     wheel = names(build("wheel", project, tmp_path / "wheel"))
-    shipped = {
-        f"drillfem/{p.relative_to(project / 'drillfem')}" for p in (project / "drillfem").rglob("*.py")
-    }
+    shipped = {f"drillfem/{p.relative_to(project / 'drillfem')}" for p in (project / "drillfem").rglob("*.py")}
     for name, target in LINKS.items():
-        found = {
-            f"drillfem/{name}/{p.name}" for p in (project / target).iterdir() if p.suffix in (".py", ".toml")
-        }
+        found = {f"drillfem/{name}/{p.name}" for p in (project / target).iterdir() if p.suffix in (".py", ".toml")}
         assert found
         shipped |= found
     assert wheel == shipped | {"drillfem/py.typed"}
