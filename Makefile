@@ -21,7 +21,7 @@ verify: ## the long tests and the benchmarks (hours)
 	$(RUN) pytest -m "verify or slow" $(ARGS)
 	for bench in benchmarks/*.py; do $(RUN) python3 $$bench || exit 1; done
 
-# CERT=FILE hands the host's certificates to pip, where the network needs them.
+# CERT=FILE hands the certificates of the host to pip, where the network needs them (podman, buildah).
 image: ## with docker, podman or buildah
 	@builder=$$(command -v docker || command -v podman || command -v buildah) || \
 	    { echo "make image needs docker, podman or buildah" >&2; exit 1; }; \

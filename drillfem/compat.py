@@ -143,6 +143,11 @@ def reference_nodes(V: dolfinx.fem.FunctionSpace) -> Array:
     return points() if callable(points) else points
 
 
+def gauss_points(count: int) -> Array:
+    """Gauss-Legendre points on the reference interval, shape (count, 1)."""
+    return ((np.polynomial.legendre.leggauss(count)[0] + 1) / 2)[:, None]
+
+
 class VectorForm:
     """A compiled linear form that assembles into a NumPy array with little overhead."""
 

@@ -25,7 +25,7 @@ def free_folder(wish: Path) -> Path:
 def main(out: Path, seconds: float = SECONDS) -> Result:
     """Drill ``seconds`` with the spatial rod into ``out`` (or a free folder beside it), compare, draw."""
     folder = free_folder(out)
-    scene = load_scene(SCENE, {"model": "spatial"})
+    scene = load_scene(SCENE, {"model": "spatial", "output.fields_interval": "25 ms"})
     straight = load_scene(SCENE, {"model": "axial-torsional"})
     print(f"{scene.title}: a {scene.length:g} m string drills rock for {seconds:g} s, as a rod in space.")
     with ProgressDisplay() as progress:

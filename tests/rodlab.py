@@ -147,18 +147,23 @@ def equilibrium(
 
 
 # -- errors -----------------------------------------------------------------------------------------------------------
-def gauss(rod: Rod, n: int = 6) -> tuple[Array, Array, Callable[[Array], Array]]:
-    """Gauss points (m,) and weights (m,) of the mesh, and the map from nodal values (top down) to values there."""
+def gauss(rod: Rod, n: int = 6, derivative: bool = False) -> tuple[Array, Array, Callable[[Array], Array]]:
+    """Gauss points (m,) and weights (m,) of the mesh, and the map from nodal values (top down) to values (slopes) there."""
     p = rod.scene.mesh.degree
     cells = np.arange(rod.scene.mesh.elements)[:, None] * p + np.arange(p + 1)
     x, w = np.polynomial.legendre.leggauss(n)
     nodes = rod.arc_length[cells]
     start, size = nodes[:, :1], nodes[:, -1:] - nodes[:, :1]
     local = 2 * (nodes[0] - start[0]) / size[0] - 1
-    basis = np.linalg.solve(np.vander(local, p + 1).T, np.vander(x, p + 1).T)  # (p + 1, n)
+    powers = np.vander(x, p + 1)
+    if derivative:
+        powers = np.hstack([powers[:, 1:] * np.arange(p, 0, -1), np.zeros((n, 1))])
+    basis = np.linalg.solve(np.vander(local, p + 1).T, powers.T)  # (p + 1, n)
 
     def interpolate(nodal: Array) -> Array:
         values = np.einsum("an,ca...->cn...", basis, nodal[cells])
+        if derivative:
+            values = values * (2 / size).reshape(-1, *([1] * (values.ndim - 1)))
         return values.reshape(-1, *nodal.shape[1:])
 
     return (start + size * (x + 1) / 2).reshape(-1), (size * w / 2).reshape(-1), interpolate

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drillfem.bitrock.jit import kernel
 
 F8 = NDArray[np.float64]
 I8 = NDArray[np.int64]
@@ -38,22 +39,24 @@ class DGOperators:
 def dg_operators(degree: int, elements: int, width: float) -> DGOperators:
     """DG operators by numpy: Lagrange polynomials on Gauss-Lobatto points (midpoint for degree 0), equal elements."""
     if degree < 0 or elements < 1 or not width > 0:
-        raise ValueError(f"surface: degree {degree}, elements {elements}, width {width}: need degree >= 0, elements >= 1, width > 0")
+        given = f"degree {degree}, elements {elements}, width {width}"
+        raise ValueError(f"surface: {given}: need degree >= 0, elements >= 1, width > 0")
     legendre = np.polynomial.legendre.Legendre
-    inner = np.real(legendre.basis(degree).deriv().roots()) if degree > 1 else np.array([])
-    points = np.concatenate([[-1.0], np.sort(inner), [1.0]]) if degree else np.array([0.0])
+    inner: F8 = np.real(legendre.basis(degree).deriv().roots()) if degree > 1 else np.zeros(0)
+    points = np.array([-1.0, *np.sort(inner), 1.0]) if degree else np.zeros(1)
     x, weight = np.polynomial.legendre.leggauss(degree + 1)
 
-    inverse = np.linalg.inv(np.polynomial.legendre.legvander(points, degree))
-    value = np.polynomial.legendre.legvander(x, degree) @ inverse
-    slopes = np.stack([legendre.basis(i).deriv()(x) if i else 0 * x for i in range(degree + 1)], axis=1) @ inverse
+    inverse: F8 = np.linalg.inv(np.polynomial.legendre.legvander(points, degree))
+    value: F8 = np.polynomial.legendre.legvander(x, degree) @ inverse
+    derivatives = [legendre.basis(i).deriv()(x) if i else 0 * x for i in range(degree + 1)]
+    slopes: F8 = np.asarray(derivatives, np.float64).T @ inverse
     left, right = (np.polynomial.legendre.legvander([e], degree)[0] @ inverse for e in (-1.0, 1.0))
 
     size, h = degree + 1, width / elements
-    one = np.eye(elements)
-    stiff = slopes.T @ (weight[:, None] * value)  # int u psi' deta on an element
+    one: F8 = np.eye(elements)
+    stiff: F8 = slopes.T @ (weight[:, None] * value)  # int u psi' deta on an element
     return DGOperators(
-        mass=np.kron(one, 0.5 * h * value.T @ (weight[:, None] * value)),
+        mass=np.asarray(np.kron(one, 0.5 * h * value.T @ (weight[:, None] * value)), np.float64),
         forward=np.kron(one, stiff - np.outer(right, right)) + np.kron(np.eye(elements, k=-1), np.outer(left, right)),
         backward=np.kron(one, -stiff - np.outer(left, left)) + np.kron(np.eye(elements, k=1), np.outer(right, left)),
         left=np.concatenate([left, np.zeros(size * (elements - 1))]),
@@ -119,7 +122,7 @@ def dg_setup(op: DGOperators, sectors: int) -> DGData:
         source=np.stack([inverse @ f for f in inflow]),
         end_column=end_column.astype(np.int64),
         end=np.take_along_axis(end, end_column, axis=1),
-        mean=np.ones(n) @ op.mass / op.width,
+        mean=op.mass.sum(axis=0) / op.width,
         column_ahead=np.stack(orders).astype(np.int64),
         reach=reach,
         derivative=np.stack([p[:, o] for p, o in zip(power, orders, strict=True)]),
@@ -130,7 +133,7 @@ def dg_setup(op: DGOperators, sectors: int) -> DGData:
     )
 
 
-@njit(cache=True)
+@kernel()
 def _end_height(column: I8, value: F8, height: F8) -> float:
     """Height where the rock leaves the sector."""
     total = 0.0
@@ -139,7 +142,7 @@ def _end_height(column: I8, value: F8, height: F8) -> float:
     return total
 
 
-@njit(cache=True, fastmath={"contract"})
+@kernel("contract")
 def _rate(column: I8, value: F8, source: F8, height: F8, inflow: float, scale: float, out: F8) -> None:
     """d height / d turn of one sector: row-wise sparse product, all rows side by side."""
     n = height.size
@@ -153,14 +156,14 @@ def _rate(column: I8, value: F8, source: F8, height: F8, inflow: float, scale: f
         out[i] *= scale
 
 
-@njit(cache=True)
+@kernel()
 def _cut(u0: float, u1: float, s0: float, s1: float, x: float) -> float:
     """Depth of the bit at the fraction x of a turn; s0, s1 are slopes times the turn."""
     y = 1.0 - x
     return u0 * y * y * (1.0 + 2.0 * x) + u1 * x * x * (3.0 - 2.0 * x) + x * y * (s0 * y - s1 * x)
 
 
-@njit(cache=True, fastmath={"contract"})
+@kernel("contract")
 def _advance(
     dg: DGData,
     width: F8,
@@ -211,7 +214,7 @@ def _advance(
     return removed
 
 
-@njit(cache=True)
+@kernel()
 def dg_commit(dg: DGData, width: F8, share: F8, turn: float, u0: float, u1: float, s0: float, s1: float) -> float:
     """Turn the bit; returns the rock removed (m rad over all blades)."""
     if turn == 0.0:
@@ -219,7 +222,7 @@ def dg_commit(dg: DGData, width: F8, share: F8, turn: float, u0: float, u1: floa
     return _advance(dg, width, share, dg.height, dg.scratch, turn, u0, u1, s0 * turn, s1 * turn)
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+@kernel("reassoc", "contract", "nsz")
 def dg_ahead(dg: DGData, width: F8, turn: float, forward: bool, height: F8, slope: F8) -> None:
     """Height of the rock that each blade meets after ``turn``, and its slope in the turn."""
     m = width.size
@@ -238,7 +241,7 @@ def dg_ahead(dg: DGData, width: F8, turn: float, forward: bool, height: F8, slop
         # backwards the rock that was behind blade b comes under it: the left end of its own sector
         height_of = state[(b + 1) % m if forward else b]
         h = 1.0 / width[(b + 1) % m if forward else b]
-        # exactly what the Runge-Kutta steps will let out: a power of the stability polynomial, applied to the end functional
+        # exactly what the Runge-Kutta steps will let out: a power of their stability polynomial at the end functional
         value = rate = before = 0.0
         term = 1.0  # (h x / steps)^k, and its derivative in x
         for k in range(4 * steps + 1):

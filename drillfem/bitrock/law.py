@@ -16,8 +16,9 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from drillfem.bitrock.jit import kernel
 
 if TYPE_CHECKING:
     from drillfem.scene import Scene
@@ -36,7 +37,7 @@ class BitForces(NamedTuple):
     wear_torque: float
 
 
-@njit(cache=True)
+@kernel()
 def ramp(x: float, width: float) -> float:
     """0 for x <= 0, 1 for x >= width, linear between; the unit step (0 at 0) for width = 0."""
     if x <= 0.0:
@@ -46,19 +47,19 @@ def ramp(x: float, width: float) -> float:
     return x / width
 
 
-@njit(cache=True)
+@kernel()
 def specific_energy(par: NDArray[np.float64], w: float) -> float:
     """Intrinsic specific energy at spin w, Pa (5-7)."""
     return par[EPS1] * ramp(w, par[C3])
 
 
-@njit(cache=True)
+@kernel()
 def strength(par: NDArray[np.float64], w: float) -> float:
     """Contact strength under the wear flats at spin w, Pa (5-6): sigma_2 when stalled, sigma_1 when turning."""
     return par[SIGMA2] + (par[SIGMA1] - par[SIGMA2]) * ramp(w, par[C2])
 
 
-@njit(cache=True)
+@kernel()
 def sign_of_spin(par: NDArray[np.float64], w: float) -> float:
     """Direction of the wear-flat torque: clip(w / c3, -1, 1); 1 in the literal law."""
     if par[LITERAL] != 0.0:
@@ -66,17 +67,17 @@ def sign_of_spin(par: NDArray[np.float64], w: float) -> float:
     return ramp(w, par[C3]) - ramp(-w, par[C3])
 
 
-@njit(cache=True)
+@kernel()
 def wear_fraction(par: NDArray[np.float64], v: float) -> float:
     """Fraction of the contact strength that acts at axial speed v (5-5): nothing while the bit rises."""
     return ramp(v, par[C1])
 
 
-@njit(cache=True)
+@kernel()
 def law_forces(
     par: NDArray[np.float64], v: float, w: float, depth: float, contact: float
 ) -> tuple[float, float, float, float, float, float]:
-    """Forces (W, T, Wc, Wf, Tc, Tf) for speeds v, w, total depth of cut and the share [0, 1] of wear flat in contact."""
+    """Forces (W, T, Wc, Wf, Tc, Tf) at speeds v, w, total depth of cut, share [0, 1] of the wear flats in contact."""
     wc = specific_energy(par, w) * par[ZETA] * par[RADIUS] * max(depth, 0.0)
     wf = strength(par, w) * wear_fraction(par, v) * par[RADIUS] * par[FLAT] * contact
     tc = 0.5 * par[RADIUS] / par[ZETA] * wc

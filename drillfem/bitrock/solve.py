@@ -14,17 +14,29 @@ several roots: the one met first when marching from the previous spin is taken.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from drillfem.bitrock.law import BLADES, C1, C2, C3, FLAT, GAMMA, MU, RADIUS, ZETA
-from drillfem.bitrock.law import sign_of_spin, specific_energy, strength
+from drillfem.bitrock.jit import kernel
+from drillfem.bitrock.law import (
+    BLADES,
+    C1,
+    C2,
+    C3,
+    FLAT,
+    GAMMA,
+    MU,
+    RADIUS,
+    ZETA,
+    sign_of_spin,
+    specific_energy,
+    strength,
+)
 from drillfem.bitrock.surface import SurfaceData, ahead
 
 F8 = NDArray[np.float64]
 
 
-@njit(cache=True)
+@kernel()
 def _threshold(free: float, g: float) -> float:
     """Force at which ``free - g W`` reaches zero; infinite where it never does (zero itself counts as contact)."""
     if g > 0.0:
@@ -32,9 +44,18 @@ def _threshold(free: float, g: float) -> float:
     return np.inf if free >= 0.0 else -np.inf
 
 
-@njit(cache=True)
+@kernel()
 def _pull(
-    weight: float, limit: bool, gap: F8, share: F8, gu: float, kappa: float, flat: float, v_free: float, gv: float, c1: float
+    weight: float,
+    limit: bool,
+    gap: F8,
+    share: F8,
+    gu: float,
+    kappa: float,
+    flat: float,
+    v_free: float,
+    gv: float,
+    c1: float,
 ) -> float:
     """Force of the law when the string yields to ``weight``; at a jump its upper value if ``limit``, else the lower."""
     stop, full = _threshold(v_free, gv), _threshold(v_free - c1, gv)
@@ -54,7 +75,7 @@ def _pull(
     return kappa * cut + flat * wear * count
 
 
-@njit(cache=True)
+@kernel()
 def solve_axial(
     gap: F8, share: F8, gu: float, kappa: float, flat: float, v_free: float, gv: float, c1: float
 ) -> tuple[float, float]:
@@ -109,7 +130,7 @@ def solve_axial(
     return weight, weight - min(max(slope * (v_free - gv * weight), 0.0), weight)
 
 
-@njit(cache=True)
+@kernel()
 def _at_spin(
     w: float,
     par: F8,
@@ -139,7 +160,7 @@ def _at_spin(
     return tc + tf, weight, cut, tc
 
 
-@njit(cache=True)
+@kernel()
 def solve_bit(
     par: F8,
     share: F8,
@@ -165,7 +186,15 @@ def solve_bit(
     turn >= 0 and row 1 for turn < 0.  w_previous : spin from which roots are followed.  work : (m,) scratch.
     """
     args = (par, share, v_free, gv, u_free, gu, w_free, turn_free, rho, ref, height, slope, work)
-    bound = 0.5 * par[RADIUS] * par[MU] * par[GAMMA] * par[RADIUS] * par[FLAT] * max(strength(par, -1.0), strength(par, par[C2] + 1.0))
+    bound = (
+        0.5
+        * par[RADIUS]
+        * par[MU]
+        * par[GAMMA]
+        * par[RADIUS]
+        * par[FLAT]
+        * max(strength(par, -1.0), strength(par, par[C2] + 1.0))
+    )
     # where the spin equation must have changed sign: T <= bound for w <= 0, T >= -bound everywhere
     far_lo = min(w_free - 1.001 * gw * bound, -1.001 * par[C3]) - 1e-12 * abs(w_free)
     far_hi = w_free + 1.001 * gw * bound + 1e-12 * abs(w_free)
@@ -181,7 +210,7 @@ def solve_bit(
     b, rb = a, ra
     torque_b, weight_b, cut_b, tc_b = torque, weight, cut, tc
     if ra != 0.0 and gw > 0.0:
-        for k in range(9):
+        for _ in range(9):
             # next break point in the direction in which the residual falls
             target = -np.inf if ra > 0.0 else np.inf
             for j in range(7):
@@ -200,7 +229,7 @@ def solve_bit(
         # Chandrupatla's method: inverse quadratic steps where they are safe, bisection across jumps.  The spin is
         # resolved to round-off, so that what remains of a steep torque is settled by interpolation below.
         t = 0.5
-        for k in range(300):
+        for _ in range(300):
             if rb == 0.0:
                 a, ra, torque, weight, cut, tc = b, rb, torque_b, weight_b, cut_b, tc_b
             if ra == 0.0:
@@ -240,7 +269,7 @@ def solve_bit(
     return weight, torque, cut, weight - cut, tc, torque - tc, v_free - gv * weight, a
 
 
-@njit(cache=True)
+@kernel()
 def bit_step(
     par: F8,
     surface: SurfaceData,
@@ -256,8 +285,9 @@ def bit_step(
 ) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
     """Solve the bit over the rock surface: (W, T, Wc, Wf, Tc, Tf, v, w, U, turn, depth).
 
-    Arguments as for `solve_bit`; u_free is the bit's depth (m) on the scale of the surface's heights, turn_free (rad) the
-    turn from the surface's committed angle.  The rock ahead is linearised where the bit ends up, by iteration.
+    Arguments as for `solve_bit`; u_free is the bit's depth (m) on the scale of the surface's heights, turn_free
+    (rad) the turn from the surface's committed angle.  The rock ahead is linearised where the bit ends up, by
+    iteration.
     The surface is not changed: commit it afterwards.  ``depth`` (m) is the signed total depth of cut: the sum of the
     cutting edges' depths, or, when no edge touches, minus the least clearance times the blades.
     """

@@ -4,8 +4,8 @@ The surface height L(eta, t) (m, positive down like the bit's depth U) runs from
 the blade behind it (eta = width of the sector) and obeys dL/dt + w dL/deta = 0 (5-21).  Speed only rescales
 time, so everything here is written in the turn phi of the bit: dL/dphi + dL/deta = 0.  Turning forwards, a blade
 leaves ``max(U, rock ahead)`` behind it: it cuts, slides, or passes above the rock.  Turning backwards cuts nothing:
-the profile passes under the blade and lies ahead of it again.  Equal blades share one sector; unequal ones have a sector each,
-and what leaves sector i meets blade i - 1, the one behind.
+the profile passes under the blade and lies ahead of it again.  Equal blades share one sector; unequal ones have
+a sector each, and what leaves sector i meets blade i - 1, the one behind.
 
 Two schemes behind one interface:
 
@@ -18,10 +18,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from drillfem.bitrock.dg import DGData, DGOperators, dg_ahead, dg_commit, dg_operators, dg_setup
+from drillfem.bitrock.jit import kernel
 from drillfem.bitrock.profile import ProfileData, profile_ahead, profile_commit, profile_setup, sector_area
 
 if TYPE_CHECKING:
@@ -42,9 +42,9 @@ class SurfaceData(NamedTuple):
     profile: ProfileData
 
 
-@njit(cache=True)
+@kernel()
 def ahead(surface: SurfaceData, turn: float, forward: bool, height: F8, slope: F8) -> None:
-    """Fill ``height`` (m,) with what the blades meet after ``turn`` (rad, from the committed angle), ``slope`` with d/dturn.
+    """Fill ``height`` (m,) with what the blades meet after ``turn`` (rad, from the committed angle), ``slope`` d/dturn.
 
     ``forward`` selects the rock ahead (turn >= 0) or the rock that comes back under the blades (turn <= 0).
     Valid up to the narrowest sector: beyond it the blade would meet rock cut during this same turn.
@@ -55,9 +55,9 @@ def ahead(surface: SurfaceData, turn: float, forward: bool, height: F8, slope: F
         profile_ahead(surface.profile, surface.width, turn, forward, height, slope)
 
 
-@njit(cache=True)
+@kernel()
 def commit(surface: SurfaceData, turn: float, u0: float, u1: float, s0: float, s1: float) -> None:
-    """Turn the bit by ``turn`` (rad, any size and sign) while its depth goes from u0 to u1 with slopes s0, s1 (m/rad)."""
+    """Turn by ``turn`` (rad, any size and sign) while the bit's depth goes from u0 to u1 with slopes s0, s1 (m/rad)."""
     if surface.scheme == DG:
         surface.removed[0] += dg_commit(surface.dg, surface.width, surface.share, turn, u0, u1, s0, s1)
     else:
@@ -138,7 +138,7 @@ class RockSurface:
                 continue
             p = data.profile
             key = np.linspace(0.0, data.width[i], knots + 1)
-            p.first[i], p.count[i] = 0, knots + 1
+            p.first[i], p.size[i] = 0, knots + 1
             p.key[i, : knots + 1] = p.phi[0] + key
             values = np.broadcast_to(function(data.width[i] - key), key.shape)
             p.height[i, : knots + 1] = values
@@ -147,7 +147,7 @@ class RockSurface:
 
     @property
     def removed(self) -> float:
-        """Integral of the total depth of cut over the turn, m rad; times (bit radius)^2 / 2 it is the volume cut, m^3."""
+        """Integral of the total depth of cut over the turn, m rad; times (bit radius)^2 / 2 it is the volume cut."""
         return float(self.data.removed[0])
 
     def ahead(self, turn: float) -> tuple[F8, F8]:
@@ -164,7 +164,7 @@ class RockSurface:
         return float(self.data.share @ np.maximum(gap, 0.0))
 
     def commit(self, turn: float, u0: float, u1: float, s0: float | None = None, s1: float | None = None) -> None:
-        """Turn by ``turn`` (rad) while the bit's depth goes from u0 to u1 (m); s0, s1 (m/rad): slopes, default straight."""
+        """Turn by ``turn`` (rad) while the depth goes from u0 to u1 (m); s0, s1 (m/rad): slopes, default straight."""
         chord = (u1 - u0) / turn if turn else 0.0
         commit(self.data, float(turn), u0, u1, chord if s0 is None else s0, chord if s1 is None else s1)
 
@@ -188,7 +188,7 @@ class RockSurface:
 
     def _knots(self, sector: int) -> tuple[F8, F8, F8, F8]:
         p = self.data.profile
-        index = (p.first[sector] + np.arange(p.count[sector])) % p.key.shape[1]
+        index = (p.first[sector] + np.arange(p.size[sector])) % p.key.shape[1]
         return p.key[sector, index], p.height[sector, index], p.before[sector, index], p.after[sector, index]
 
     def state_dict(self) -> dict[str, F8]:
@@ -211,6 +211,6 @@ class RockSurface:
         p.phi[:] = state["phi"]
         for i in range(data.width.size):
             knots = np.asarray(state[f"knots_{i}"])
-            p.first[i], p.count[i] = 0, knots.shape[1]
+            p.first[i], p.size[i] = 0, knots.shape[1]
             for array, values in zip((p.key, p.height, p.before, p.after), knots, strict=True):
                 array[i, : knots.shape[1]] = values

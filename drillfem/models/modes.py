@@ -90,7 +90,9 @@ def natural_frequencies(rod: Rod, count: int = 10, u: Array | None = None) -> di
         order = order[squares.real[order] > 1e-3 * scale][:count]
         squares, vectors = squares[order], vectors[:, order]
         if np.any(abs(squares.imag) > 1e-3 * squares.real):
-            raise SimulationError("natural frequencies need conservative loads: a dead moment on a rod that bends is none")
+            raise SimulationError(
+                "natural frequencies need conservative loads: a dead moment on a rod that bends is none"
+            )
         # two real shapes out of a conjugate pair
         squares, vectors = squares.real, np.where(squares.imag < 0, vectors.imag, vectors.real)
         vectors = vectors / np.sqrt(np.einsum("ij,ij->j", vectors, m @ vectors))

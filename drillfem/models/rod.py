@@ -19,6 +19,7 @@ from ..compat import (
     VectorForm,
     compile_expression,
     discontinuous,
+    gauss_points,
     lagrange,
     reference_nodes,
 )
@@ -79,11 +80,21 @@ def measures(mesh: StringMesh, degree: int, reduced: bool = True) -> vw.Measures
     (fully integrated P1 is 1458 times too stiff in bending on 12.5 m of drill pipe). Kinematics: Gauss-Lobatto points,
     which are the nodes of the element, so that r-dot = v holds at every node.
     """
-    dx = ufl.Measure("dx", mesh.mesh)
     ds = ufl.Measure("ds", mesh.mesh, subdomain_data=mesh.ends)
-    full = dx(metadata={"quadrature_degree": 2 * degree})
-    internal = dx(metadata={"quadrature_degree": 2 * degree - 1}) if reduced else full
-    nodal = dx(metadata={"quadrature_rule": "GLL", "quadrature_degree": 2 * degree - 1})
+    rules: list[dict[str, Any]] = [
+        {"quadrature_degree": 2 * degree - 1 if reduced else 2 * degree},
+        {"quadrature_degree": 2 * degree},
+        {"quadrature_rule": "GLL", "quadrature_degree": 2 * degree - 1},
+    ]
+    if degree == 1:
+        # a kernel of its own for each rule: FFCx 0.9 takes fields at the single point of one rule for their values at
+        # the points of the other rules in the same kernel
+        every = np.arange(mesh.cells.values.size, dtype=np.int32)
+        dx = ufl.Measure("dx", mesh.mesh, subdomain_data=[(k, every) for k in range(3)])
+        internal, full, nodal = (dx(k, metadata=rule) for k, rule in enumerate(rules))
+    else:
+        dx = ufl.Measure("dx", mesh.mesh)
+        internal, full, nodal = (dx(metadata=rule) for rule in rules)
     return vw.Measures(internal, full, nodal, full, ds(TOP), ds(BOTTOM))
 
 
@@ -382,17 +393,29 @@ class Rod:
         n, m = elastic_resultants(at, self.section, self.loads.u0, self.literal)
         n_v, m_v = viscous_resultants(at, self.ansatz.twist(v, at), self.section)
         both = ufl.as_vector([*(n + n_v), *(m + m_v)])
-        return compile_expression(both, reference_nodes(self.V), self.mesh.comm)
+        return compile_expression(both, gauss_points(self.scene.mesh.degree), self.mesh.comm)
 
     def resultants(self) -> tuple[Array, Array]:
-        """Internal force (nodes, 3; N) and moment (nodes, 3; N m), material components, averaged at the nodes."""
+        """Internal force (nodes, 3; N) and moment (nodes, 3; N m), material components.
+
+        Taken at the integration points, where they are accurate (at the nodes of a slender element they zigzag), carried
+        to the nodes by the polynomial through them, and averaged between elements.
+        """
         cells = np.arange(self.mesh.topology.index_map(1).size_local, dtype=np.int32)
         values = self._resultants.eval(self.mesh, cells).reshape(len(cells), -1, 6)
         total, count = np.zeros((len(self.nodes), 6)), np.zeros(len(self.nodes))
-        np.add.at(total, self.V.dofmap.list, values)
+        np.add.at(total, self.V.dofmap.list, np.einsum("ng,cgk->cnk", self._to_nodes, values))
         np.add.at(count, self.V.dofmap.list, 1.0)
         mean = (total / count[:, None])[self.nodes]
         return mean[:, :3], mean[:, 3:]
+
+    @cached_property
+    def _to_nodes(self) -> Array:
+        """Values at the integration points to values at the nodes of an element, shape (nodes, points)."""
+        points, nodes = gauss_points(self.scene.mesh.degree)[:, 0], reference_nodes(self.V)[:, 0]
+        vander = np.polynomial.legendre.legvander
+        n = len(points) - 1
+        return vander(2 * nodes - 1, n) @ np.linalg.inv(vander(2 * points - 1, n))
 
     def shape(self) -> tuple[Array, Array]:
         """Centreline (nodes, 3; m) and rotation matrices (nodes, 3, 3) of the present state, from the top down."""

@@ -68,6 +68,10 @@ def render_result(
     if story.fields is not None:
         made.append(charts.space_time(story, pictures / "space-time.png"))
         made.append(charts.rock(story, index, pictures / "rock.png"))
+    for name in ("spectra.png", "space-time.png", "rock.png"):
+        if pictures / name not in made:  # of an earlier, longer or finer run in this folder
+            (pictures / name).unlink(missing_ok=True)
+    if story.fields is not None:
         made += _string(story, chosen, index, pictures, film)
     return [path for path in made if path is not None]
 

@@ -58,6 +58,7 @@ def save_gif(frames: list[np.ndarray], path: Path, once: bool) -> None:
     wide = Image.new("RGB", (sum(p.width for p in sample), sample[0].height))
     for k, picture in enumerate(sample):
         wide.paste(picture, (k * picture.width, 0))
+    wide.paste(style.VERMILION, (0, 0, 60, 60))  # a small spot, which the palette would else forget
     palette = wide.quantize(128, method=Image.Quantize.MEDIANCUT)
     small = [p.quantize(palette=palette, dither=Image.Dither.NONE) for p in pictures]
     pause = 160 if once else MILLISECONDS

@@ -74,9 +74,12 @@ def find_view(story: Story, width: int, tallest: int, room: float) -> tuple[View
             up = -along / np.linalg.norm(along)
             right = np.cross(up, normal)
         else:  # no weight: the longer side lies
-            first = _axis_like(spread[2][0] - (spread[2][0] @ normal) * normal)
+            first = spread[2][0]
+            if np.abs(normal).max() > 0.999:  # along a coordinate, so that the scales are those of coordinates
+                first = np.eye(3)[int(np.argmax(np.abs(first)))]
             right, up = first, np.cross(normal, first)
-        right = right * _sign(right, points)
+        if right @ (story.position[0, -1] - story.position[0, 0]) < 0:  # at first the string runs to the right
+            right = -right
         near = np.cross(right, up)
     else:
         start = story.position[0]
@@ -113,11 +116,6 @@ def _axis_like(vector: np.ndarray) -> np.ndarray:
     if abs(vector[k]) > 0.999:
         return np.eye(3)[k]
     return np.asarray(vector if vector[k] > 0 else -vector)
-
-
-def _sign(direction: np.ndarray, points: np.ndarray) -> float:
-    """+1 or -1: lets the string's first pose run to the right."""
-    return 1.0 if direction @ (points[-1] - points[0]) >= -1e-9 or abs(direction).max() < 0.999 else -1.0
 
 
 def tube_of(
@@ -222,8 +220,10 @@ def dress(axes: Axes, view: View) -> None:
         return
     for direction, axis in ((view.right, axes.xaxis), (view.up, axes.yaxis)):
         k = int(np.argmax(np.abs(direction)))
-        sign = 1 if direction[k] > 0 else -1
-        axis.set_major_formatter(_signed(sign))
+        if abs(direction[k]) < 0.999:
+            axis.set_label_text("m")
+            continue
+        axis.set_major_formatter(_signed(1 if direction[k] > 0 else -1))
         axis.set_label_text(f"{AXES[k]} (m)")
 
 

@@ -34,9 +34,14 @@ def load_pyvista() -> Any:
     """The module, or MissingDependency in one line."""
     try:
         import pyvista
-    except ImportError as reason:
+    except ModuleNotFoundError as reason:
         raise MissingDependency(
             "pictures of the string need pyvista, which is not installed: pip install pyvista"
+        ) from reason
+    except ImportError as reason:  # a system library is missing, mostly libGL or libXrender
+        said = " ".join(str(reason).split())
+        raise MissingDependency(
+            f"pyvista cannot be loaded ({said}): apt-get install libgl1 libegl1 libxrender1"
         ) from reason
     from vtkmodules.vtkCommonCore import vtkLogger
 
@@ -397,7 +402,7 @@ def rock_drum(radius: float, azimuth: np.ndarray, z: np.ndarray, foot: float) ->
         )[:1]
     )
     return [
-        Thing(floor, point_colours="tint", specular=0.0),
+        Thing(floor, point_colours="tint", specular=0.0, diffuse=0.68),
         Thing(wall, point_colours="tint", specular=0.0),
         Thing(rim, (0.25, 0.18, 0.10), specular=0.0),
     ]

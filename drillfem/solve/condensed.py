@@ -1,12 +1,12 @@
 """The straight string condensed onto the bit: exact linear dynamics between the ends, the bit law solved per step.
 
-An axial-torsional string is linear except at the bit.  Each of its two channels, ``M q'' + C q' + K q = load - e_bit P``,
-is brought to modal coordinates once; a step then propagates every mode by its exact solution, so that only the history of
-the bit force P within the step is approximated:
+An axial-torsional string is linear except at the bit.  Each of its two channels,
+``M q'' + C q' + K q = load - e_bit P``, is brought to modal coordinates once; a step then propagates every mode by
+its exact solution, so that only the history of the bit force P within the step is approximated:
 
 * the cutting force is linear in the step while the bit cuts at both ends of it (second order);
-* the wear-flat force is constant in the step and takes its end value, and so is everything while the bit is stalled, turns
-  backwards, leaves the bottom or lands: a linear multiplier would ring where the bit sticks;
+* the wear-flat force is constant in the step and takes its end value, and so is everything while the bit is
+  stalled, turns backwards, leaves the bottom or lands: a linear multiplier would ring where the bit sticks;
 * a step in which the wear-flat force changes, or that is not cutting throughout, is divided so that the fastest mode is
   resolved: on longer steps the modes beyond the sampling rate answer a sticking bit with the wrong sign, and it rings.
 
@@ -20,11 +20,26 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from drillfem.bitrock.law import BLADES, C1, C2, C3, EPS1, FLAT, GAMMA, MU, RADIUS, SIGMA1, ZETA, BitLaw, law_forces, wear_fraction
+from drillfem.bitrock.jit import kernel
+from drillfem.bitrock.law import (
+    BLADES,
+    C1,
+    C2,
+    C3,
+    EPS1,
+    FLAT,
+    GAMMA,
+    MU,
+    RADIUS,
+    SIGMA1,
+    ZETA,
+    BitLaw,
+    law_forces,
+    wear_fraction,
+)
 from drillfem.bitrock.solve import bit_step
 from drillfem.bitrock.surface import RockSurface, SurfaceData, ahead, commit
 
@@ -97,14 +112,14 @@ class Modes(NamedTuple):
     big: F8  # (2, 2, 2n, 2n): step matrix and dissipation form where damping couples the modes; else (2, 2, 1, 1)
 
 
-# rows of Modes.table.  Step matrix of (x, v); answers of x, v to a unit bit force constant over the step (CX, CV) and to
-# one that grows from 0 to 1 (RX, RV); dissipation over the step as a quadratic form of (x, v, constant force, growing force)
+# rows of Modes.table.  Step matrix of (x, v); answers of x, v to a unit bit force constant over the step (CX, CV) and
+# to one that grows from 0 to 1 (RX, RV); dissipation over the step as a quadratic form of (x, v, constant, growing)
 (E11, E12, E21, E22, CX, CV, RX, RV, QXX, QXV, QVV, QXP, QVP, QXR, QVR) = range(15)
-# mode shapes at bit and top; omega^2; static position under load and mean bit force; momentum in a uniform motion; static
-# answer to a uniform acceleration; its restoring and damping rows; constant load
+# mode shapes at bit and top; omega^2; static position under load and mean bit force; momentum in a uniform motion;
+# static answer to a uniform acceleration; its restoring and damping rows; constant load
 (BIT, HOOK, SQUARE, REST, UNIFORM, STILL, PULL, DRAG, LOAD) = range(15, 24)
-# numbers: rest of the dissipation form; bit force that balances the load on the uniform motion; answers of the bit to the
-# two unit forces, against the force (GU, GV constant; HU, HV growing); total inertia; share of the bit force it sees at once
+# numbers: rest of the dissipation form; bit force that balances the load on the uniform motion; answers of the bit to
+# the two unit forces, against the force (GU, GV constant; HU, HV growing); total inertia; UNIFORM . BIT
 (QPP, QPR, QRR, MEAN, GU, GV, HU, HV, INERTIA, REACH) = range(10)
 
 
@@ -156,7 +171,16 @@ def _condense(
 
 
 def _step_data(
-    square: F8, damping: F8, dense: bool, bit: F8, weight: F8, hook: F8, uniform: F8, inertia: float, step: float, driven: bool
+    square: F8,
+    damping: F8,
+    dense: bool,
+    bit: F8,
+    weight: F8,
+    hook: F8,
+    uniform: F8,
+    inertia: float,
+    step: float,
+    driven: bool,
 ) -> tuple[F8, F8, F8]:
     """Exact propagation of the modes over one step, and what is read from them."""
     n = len(square)
@@ -175,17 +199,18 @@ def _step_data(
         # the force enters scaled, for the same reason
         size = np.abs(bit).max() * step
         a[0, j, 2 * n] /= size
-        e, q = (m[0] for m in _step_matrices(a, loss, step))
-        unscale = np.concatenate([scale, np.ones(n), [size, size]])
+        es, qs = _step_matrices(a, loss, step)
+        e, q = es[0], qs[0]
+        unscale: F8 = np.concatenate([scale, np.ones(n), [size, size]])
         e, q = e * unscale[None, :] / unscale[:, None], q * unscale[None, :] * unscale[:, None]
         big = np.stack([e[: 2 * n, : 2 * n], q[: 2 * n, : 2 * n]])
-        e11 = e12 = e21 = e22 = qxx = qxv = qvv = np.zeros(n)
+        e11 = e12 = e21 = e22 = qxx = qxv = qvv = np.zeros_like(square)
         p, r = 2 * n, 2 * n + 1
         cx, cv, rx, rv = e[:n, p], e[n : 2 * n, p], e[:n, r], e[n : 2 * n, r]
         qxp, qvp, qxr, qvr = q[:n, p], q[n : 2 * n, p], q[:n, r], q[n : 2 * n, r]
         qpp, qpr, qrr = q[p, p], 2 * q[p, r], q[r, r]
     else:
-        e, q = np.empty((n, 4, 4)), np.empty((n, 4, 4))
+        es, qs = np.empty((n, 4, 4)), np.empty((n, 4, 4))
         norms = (scale + diagonal) * step
         for level in np.unique(np.ceil(np.log2(norms))):
             some = np.ceil(np.log2(norms)) == level
@@ -193,10 +218,10 @@ def _step_data(
             a[:, 0, 1], a[:, 1, 0], a[:, 1, 1] = scale[some], -square[some] / scale[some], -diagonal[some]
             a[:, 1, 2], a[:, 2, 3] = -1.0 / step, 1.0 / step  # unit force, scaled by the step
             loss[:, 1, 1] = diagonal[some]
-            e[some], q[some] = _step_matrices(a, loss, step)
+            es[some], qs[some] = _step_matrices(a, loss, step)
         unscale = np.stack([scale, np.ones(n), bit * step, bit * step], axis=1)
-        e[:, :2] = e[:, :2] * unscale[:, None, :] / unscale[:, :2, None]
-        q = q * unscale[:, None, :] * unscale[:, :, None]
+        e = es[:, :2] * unscale[:, None, :] / unscale[:, :2, None]
+        q = qs * unscale[:, None, :] * unscale[:, :, None]
         big = np.zeros((2, 1, 1))
         e11, e12, e21, e22 = e[:, 0, 0], e[:, 0, 1], e[:, 1, 0], e[:, 1, 1]
         cx, cv, rx, rv = e[:, 0, 2], e[:, 1, 2], e[:, 0, 3], e[:, 1, 3]
@@ -212,7 +237,7 @@ def _step_data(
     return np.stack(rows), np.array([qpp, qpr, qrr, mean, *answers, inertia, uniform @ bit]), big
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+@kernel("reassoc", "contract", "nsz")
 def _propagate(
     table: F8, big: F8, last: F8, x: F8, v: F8, p: float, r: float, x1: F8, v1: F8
 ) -> tuple[float, float, float, float, float]:
@@ -260,7 +285,7 @@ def _propagate(
     return u, w, s0, s1, s2
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+@kernel("reassoc", "contract", "nsz")
 def _observe(
     table: F8, x: F8, v: F8, p: float, r: float, shift: float
 ) -> tuple[float, float, float, float, float, float, float]:
@@ -270,7 +295,13 @@ def _observe(
     """
     kinetic = strain = momentum = position = force = load = top = 0.0
     cx, cv, rx, rv, square, rest, still = (
-        table[CX], table[CV], table[RX], table[RV], table[SQUARE], table[REST], table[STILL]
+        table[CX],
+        table[CV],
+        table[RX],
+        table[RV],
+        table[SQUARE],
+        table[REST],
+        table[STILL],
     )
     uniform, pull, drag, load_row, hook = table[UNIFORM], table[PULL], table[DRAG], table[LOAD], table[HOOK]
     for j in range(table.shape[1]):
@@ -294,7 +325,7 @@ def _observe(
 N_SCALARS = 28
 
 
-@njit(cache=True)
+@kernel()
 def _cut_smoothly(
     par: F8,
     surface: SurfaceData,
@@ -308,7 +339,7 @@ def _cut_smoothly(
     work: F8,
     out: F8,
 ) -> bool:
-    """Step with the cutting force linear in time: closed form.  False if the bit leaves the regime (nothing is changed)."""
+    """Step with the cutting force linear in time: closed form.  False, and nothing changed, if it is not cutting."""
     m = surface.share.size
     ta, tf = 0.5 * par[RADIUS] / par[ZETA], 0.5 * par[RADIUS] * par[MU] * par[GAMMA]
     kappa = par[EPS1] * par[ZETA] * par[RADIUS]
@@ -359,7 +390,7 @@ def _cut_smoothly(
     return True
 
 
-@njit(cache=True)
+@kernel()
 def _substep(
     par: F8,
     surface: SurfaceData,
@@ -375,7 +406,7 @@ def _substep(
     work: F8,
     out: F8,
 ) -> bool:
-    """One step of one kind (0 whole, 1 part).  A whole step must be smooth: otherwise False, and nothing has changed."""
+    """One step of one kind (0 whole, 1 part).  A whole step must be smooth: else False, and nothing has changed."""
     ca, ct = axial.number[kind], torsion.number[kind]
     last = int(s[KIND])
     acceleration = s[ACC]
@@ -383,7 +414,15 @@ def _substep(
         axial.table[kind], axial.big[kind], axial.table[last], modes[0], modes[1], s[PA], s[RA], spare[0], spare[1]
     )
     yf, wf_, t0, t1, t2 = _propagate(
-        torsion.table[kind], torsion.big[kind], torsion.table[last], modes[2], modes[3], s[PT], s[RT], spare[2], spare[3]
+        torsion.table[kind],
+        torsion.big[kind],
+        torsion.table[last],
+        modes[2],
+        modes[3],
+        s[PT],
+        s[RT],
+        spare[2],
+        spare[3],
     )
     wf_ += speed1
     turned = angle1 - s[TOP]
@@ -455,7 +494,7 @@ def _substep(
     return True
 
 
-@njit(cache=True)
+@kernel()
 def _march(
     par: F8,
     surface: SurfaceData,
@@ -471,7 +510,7 @@ def _march(
     every: int,
     rows: F8,
 ) -> None:
-    """Steps after number ``first``: as many as ``top`` (steps + 1, 2: angle, speed) has; a row at each multiple of ``every``."""
+    """Steps after number ``first``, as many as ``top`` (steps + 1, 2: angle, speed) has; a row each ``every`` steps."""
     work, out, spare = np.empty((2, surface.share.size)), np.empty(10), np.empty_like(modes)
     written = 0
     for k in range(top.shape[0] - 1):
@@ -509,7 +548,7 @@ def _march(
             written += 1
 
 
-@njit(cache=True)
+@kernel()
 def _row(
     par: F8,
     surface: SurfaceData,
@@ -605,7 +644,7 @@ class CondensedString:
         return tuple(np.sqrt(c.table[0, SQUARE]) / (2 * np.pi) for c in (self._axial, self._torsion))
 
     def nominal(self) -> tuple[F8, F8]:
-        """Nodal displacement (m, zero at the top) and twist (rad, zero at the top) of steady drilling (spec 9.2, 9.3)."""
+        """Nodal displacement (m) and twist (rad) of steady drilling, both zero at the top (spec 9.2, 9.3)."""
         torque = self.law.torque(self.law.depth_of_cut(self._axial.number[0, MEAN]))
         u = self._axial_shapes @ self._axial.table[0, REST]
         twist, table = np.zeros(len(self.torsion.mass)), self._torsion.table[0]
@@ -650,9 +689,9 @@ class CondensedString:
         return dict(zip(OUTPUTS, (float(x) for x in row - self._offset), strict=True))
 
     def advance(self, steps: int, every: int = 1) -> dict[str, F8]:
-        """March; returns the outputs at each step number that ``every`` divides.  Chunks of any size give the same numbers."""
+        """March; returns the outputs at step numbers that ``every`` divides.  Chunks of any size agree to the bit."""
         times = self.step * np.arange(self.count, self.count + steps + 1)
-        top = np.stack(self._top(times), axis=1)
+        top = np.stack(self._top(np.asarray(times, np.float64)), axis=1)
         rows = np.empty(((self.count + steps) // every - self.count // every, len(OUTPUTS)))
         state = (self._axial, self._torsion, self._modes, self._s)
         run = (self.count, self.step, self.parts, top, self.hook_load, every, rows)
@@ -682,7 +721,7 @@ class CondensedString:
 
     @property
     def counters(self) -> dict[str, int]:
-        """Steps taken, those that were divided, and the parts in which the bit was stalled, off bottom or in between."""
+        """Steps taken, those that were divided, and parts solved with the bit stalled, off bottom or in between."""
         return {"steps": self.count, "divided": int(self._s[DIVIDED]), "solved": int(self._s[SOLVED])}
 
     def state_dict(self) -> dict[str, Any]:
@@ -699,7 +738,7 @@ class CondensedString:
 
 
 def energy_imbalance(history: dict[str, F8]) -> F8:
-    """Stored energy minus what came in and plus what left, relative to its first value, J; zero up to the scheme's error."""
+    """Stored energy minus what came in plus what left, from its first value, J: zero up to the scheme's error."""
     h = history
     stored = h["kinetic_energy"] + h["strain_energy"]
     balance = stored - h["work_top_drive"] - h["work_hook_load"] - h["work_gravity"]

@@ -16,6 +16,8 @@ from ..scene import Time
 from .newton import BitCoupledNewton, BitLoad
 
 _serial = itertools.count()
+#: rejections beyond one per step that end a run
+_TROUBLE = 200
 
 
 def configure(ts: PETSc.TS, time: Time, prefix: str) -> None:
@@ -78,7 +80,8 @@ class Stepper:
         ts.setIFunction(self._function, self._f)
         ts.setIJacobian(self._jacobian, self._matrix)
         ts.setExactFinalTime(PETSc.TS.ExactFinalTime.STEPOVER)
-        ts.setMaxSNESFailures(12)
+        # a step gives up after its rejections; failures add up over the whole run and must not end it
+        ts.setMaxSNESFailures(2**31 - 2)
         ts.setErrorIfStepFails(False)
         configure(ts, self.time, prefix)
         ts.setMaxSteps(2**31 - 2)
@@ -91,6 +94,7 @@ class Stepper:
         ts.setTimeStep(self.time.step)
         self._alpha = ts.getType() == PETSc.TS.Type.ALPHA
         self.rejected = 0
+        self._trouble = 0
         self._restart = True
 
     def _function(self, ts: PETSc.TS, t: float, u: PETSc.Vec, u_dot: PETSc.Vec, f: PETSc.Vec) -> None:
@@ -128,9 +132,9 @@ class Stepper:
         if abs(h - ts.getTimeStep()) > 0:
             ts.setTimeStep(h)
         self._restart = False
-        before = ts.getStepRejections() + ts.getSNESFailures()
+        before = ts.getStepRejections()  # a failed solve is a rejection too
         ts.step()
-        after = ts.getStepRejections() + ts.getSNESFailures()
+        after = ts.getStepRejections()
         self.rejected += after - before
         reason = ts.getConvergedReason()
         if reason < 0:
@@ -141,6 +145,12 @@ class Stepper:
         now = ts.getTime()
         if after > before:
             self.newton.forget()
+        self._trouble = max(0, self._trouble + after - before - 1)
+        if self._trouble > _TROUBLE:
+            raise SimulationError(
+                f"time stepping breaks down at t = {now:.6g} s (step down to {now - t:.2g} s, nearly every one refused): "
+                "try a smaller time.step or another time.integrator"
+            )
         return StepReport(now, now - t, self.stage_time)
 
     def destroy(self) -> None:

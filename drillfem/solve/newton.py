@@ -243,6 +243,8 @@ class BitCoupledNewton:
         f = self._residual
         reason = PETSc.SNES.ConvergedReason.DIVERGED_MAX_IT
         previous, renew_after = np.inf, False
+        # where to go back to when a kept Jacobian leads astray: behind the last update that can be trusted
+        trusted, trusted_load, first = values.copy(), self._load.copy(), True
         for iteration in range(_MAX_ITERATIONS):
             snes.computeFunction(x, f)
             if iteration == 0:
@@ -251,7 +253,8 @@ class BitCoupledNewton:
                 self.only_shift = False
                 if abs(self.shift - self._factored_shift) > 1e-10 * self.shift:
                     self._renew = True
-            if self._renew or not self.keep:
+            fresh = self._renew or not self.keep
+            if fresh:
                 self._factorise(snes, x)
                 self._contraction = 1.0
             elif self._turning and iteration == 0:
@@ -271,20 +274,34 @@ class BitCoupledNewton:
             if not np.isfinite(size):
                 reason = PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
                 break
-            if iteration > 0:
-                self._contraction = size / previous
-                self._renew = self._contraction > _STALLED
-                renew_after = renew_after or self._contraction > _SLOW
-            # what is left after this update is contraction/(1 - contraction) of it; a kept Jacobian contracts as it
-            # did in the last solve, with a margin
-            rate = self._contraction if iteration > 0 else min(1.0, 4 * self._contraction)
+            if not first:
+                # below the tolerance it is round-off that is seen
+                if size > 1.0:
+                    self._contraction = size / previous
+                    if not fresh and self._contraction > _STALLED:
+                        values[:] = trusted
+                        rod.set_bit_load(*trusted_load)
+                        self._renew = first = True
+                        continue
+                    self._renew = self._contraction > _STALLED
+                    renew_after = renew_after or self._contraction > _SLOW
+                else:
+                    self._contraction = min(self._contraction, size / previous)
+            # what is left after this update is contraction/(1 - contraction) of it. The Jacobian of a drilling string turns
+            # with it and contracts as it did in the last solve, with a margin; of any other rod it is not trusted so far
+            if bit is None:
+                rate = 1.0
+            else:
+                rate = min(1.0, 4 * self._contraction) if first else self._contraction
             if size < 1.0 or (rate < 0.5 and size * rate / (1 - rate) < 1.0):
                 reason = PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE
                 # reactions and powers are read from the state that the residual has seen last
                 if size > 1.0:
                     snes.computeFunction(x, f)
                 break
-            previous = size
+            if fresh or not first:
+                trusted[:], trusted_load[:] = values, self._load
+            previous, first = size, False
         self._renew = self._renew or renew_after
         snes.setConvergedReason(reason)
         if reason > 0:

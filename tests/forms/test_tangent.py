@@ -13,7 +13,7 @@ from drillfem.models.rod import Rod
 from drillfem.scene import Scene
 from drillfem.solve.statics import Statics
 
-CASES = ["spatial", "planar", "axial-torsional", "torsional", "literal"]
+CASES = ["spatial", "planar", "axial-torsional", "torsional", pytest.param("literal", marks=pytest.mark.slow)]
 SHIFT = 40.0
 
 
@@ -49,7 +49,9 @@ def state(rod: Rod, seed: int = 3) -> tuple[Array, Array]:
         block[rod.nodes, i] += wave(rng, rod.length, 0.01 if name.startswith("r") else 0.1)(rod.arc_length)
         if name == "r1":
             block[:, i] += 0.3
-    u_dot = put(rod, np.zeros(rod.size), **{n: wave(rng, rod.length, 1.0) for n in rod.ansatz.x_names + rod.ansatz.v_names})
+    u_dot = put(
+        rod, np.zeros(rod.size), **{n: wave(rng, rod.length, 1.0) for n in rod.ansatz.x_names + rod.ansatz.v_names}
+    )
     return block.reshape(-1), u_dot
 
 
@@ -134,4 +136,3 @@ def test_tangent_of_statics(case: str) -> None:
         problem.x.x.array[:] = x + factor * h * direction
         B += weight * problem.residual(out) / (12 * h)
     assert abs(A - B).max() < 2e-9 * abs(A).max()
-

@@ -32,7 +32,7 @@ def lagrange_matrices(modulus, density, cells, degree=3):
 
 
 def c1_string(
-    retardation, step=1e-3, scheme="dg", elements=(53, 11), degree=2, rock_elements=16, spin=0.1, top=SPEED, collar_retardation=None, **law
+    retardation, step=1e-3, scheme="dg", elements=(53, 11), spin=0.1, top=SPEED, collar_retardation=None, parts=None
 ):
     """The string of spec T6.1 with E = 210 GPa, g = 9.80665, in nominal drilling with a spin perturbation."""
     cells = np.concatenate([np.full(n, length / n) for (length, _, _), n in zip(PARTS, elements, strict=True)])
@@ -46,22 +46,19 @@ def c1_string(
     _, damp, _, _ = lagrange_matrices(77e9 * polar * times, RHO * polar, cells)
     torsion = Channel(mass, damp, stiff, len(s) - 1, 0)
     bit = BitLaw(
-        **{
-            "specific_energy": 0.252e9,
-            "contact_strength": 0.252e9,
-            "contact_strength_stalled": 0.504e9,
-            "radius": 0.108,
-            "wear_flat_length": 1.2e-3,
-            "inclination": 0.38,
-            "friction": 0.8,
-            "blades": 6,
-        }
-        | law
+        specific_energy=0.252e9,
+        contact_strength=0.252e9,
+        contact_strength_stalled=0.504e9,
+        radius=0.108,
+        wear_flat_length=1.2e-3,
+        inclination=0.38,
+        friction=0.8,
+        blades=6,
     )
     cut = bit.depth_of_cut(WEIGHT_ON_BIT)
-    rock = RockSurface(scheme, 6, degree=degree, elements=rock_elements, incline=-cut / (2 * np.pi))
+    rock = RockSurface(scheme, 6, incline=-cut / (2 * np.pi))
     hook = float(axial.load.sum() - WEIGHT_ON_BIT)
-    string = CondensedString(axial, torsion, bit, rock, step, hook_load=hook, top=top)
+    string = CondensedString(axial, torsion, bit, rock, step, hook_load=hook, top=top, parts=parts)
     u, twist = string.nominal()
     string.reset(u, np.full(len(s), cut * SPEED / (2 * np.pi)), twist, SPEED * (1 + spin * s / s[-1]))
     return string
@@ -106,15 +103,17 @@ def test_growth_of_the_self_excitation(surface):
     assert np.abs(rates - (2.79763 + 14.66778j)).min() < 2e-4
 
 
-@pytest.mark.parametrize("blades, top, ratio", [(4, 10.918, 1.132), (6, 10.030, 1.0386)])
-def test_stick_slip_of_the_lumped_model(blades, top, ratio):
-    """field.md 3.5, beta = 0.3, statistics on 200-250: largest speed and rate of penetration over the nominal one."""
-    string = lumped(blades, 2e-3, ("profile", {}), spin=0.1)
-    h = string.advance(125_000)
+@pytest.mark.parametrize("blades, friction, low, high, rate", [
+    (8, 0.3, 0.91, 9.09, None), (10, 0.3, 1.51, 8.49, None), (4, 1.3, 4.93, 5.09, 1.304), (6, 1.3, 4.94, 5.07, 1.218),
+])  # fmt: skip
+def test_lumped_model_without_stick(blades, friction, low, high, rate):
+    """field.md 3.5, statistics on 200-250: range of the spin, and rate of penetration over the nominal one."""
+    h = lumped(blades, 2e-3, ("profile", {}), friction, spin=0.1).advance(125_000)
     late = h["time"] >= 200
-    assert h["bit_angular_speed"][late].max() == pytest.approx(top, rel=0.01)
-    depth = h["bit_depth"][late]
-    assert (depth[-1] - depth[0]) / 50.0 / (10.0 / (2 * np.pi)) == pytest.approx(ratio, abs=0.012)
+    spin, depth = h["bit_angular_speed"][late], h["bit_depth"][late]
+    assert spin.min() == pytest.approx(low, abs=0.03) and spin.max() == pytest.approx(high, abs=0.03)
+    if rate is not None:
+        assert (depth[-1] - depth[0]) / 50.0 / (10.0 / (2 * np.pi)) == pytest.approx(rate, abs=0.004)
 
 
 @pytest.mark.parametrize("scheme", ["dg", "profile"])
@@ -139,7 +138,7 @@ def test_energy_closes(retardation, divided):
     turnover = h["work_top_drive"][-1] + h["work_gravity"][-1]
     assert np.abs(energy_imbalance(h)).max() < 1e-6 * turnover
     assert h["dissipated"][-1] > 0 and np.diff(h["dissipated"]).min() > -1e-6
-    # what the cutting forces do is the specific energy of the rock that is gone
+    # what the cutting forces do is the specific energy of the rock that is gone (and a thousandth of axial work)
     assert h["work_cutting"][-1] == pytest.approx(0.252e9 * h["rock_volume"][-1], rel=5e-3)
 
 
@@ -214,6 +213,7 @@ def test_one_free_mode_is_exact():
     """A bit off bottom: modes swing freely, whatever the step."""
     for step in (1e-3, 0.05):
         string = lumped(4, step, ("profile", {}))
+        string.surface.set_profile([lambda eta: 2.0 + eta])
         string.reset(np.array([0.0]), np.array([-50.0]), np.zeros(2), np.array([5.0, 9.0]))
         h = string.advance(round(0.2 / step))
         t = h["time"]
@@ -226,19 +226,12 @@ def test_a_stuck_bit_does_not_ring():
     """Without division, modes beyond the sampling rate answer a sticking bit with the wrong sign (known wrong way)."""
 
     def rattle(parts):
-        string = c1_string(1e-5, spin=0.6)
-        string = CondensedString(
-            string.axial, string.torsion, string.law, string.surface, 1e-3, hook_load=string.hook_load, top=SPEED, parts=parts
-        )
-        u, twist = string.nominal()
-        s = np.linspace(0, 1, len(u))
-        string.reset(u, np.full(len(u), 2.89389e-3), twist, SPEED * (1 + 0.6 * s))
-        v = string.advance(40_000)["bit_axial_speed"][20_000:]
+        v = c1_string(1e-5, spin=0.6, parts=parts).advance(40_000)["bit_axial_speed"][20_000:]
         power = np.abs(np.fft.rfft(v - v.mean())) ** 2
         return power[np.fft.rfftfreq(len(v), 1e-3) > 450].sum() / power.sum()
 
     assert c1_string(1e-5).parts == 2
-    assert rattle(None) < 0.02 < 10 * rattle(None) < rattle(1)
+    assert 20 * rattle(None) < rattle(1)
 
 
 def spectrum(history, name, window):

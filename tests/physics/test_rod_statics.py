@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rodlab import Array, bar, equilibrium, l2, put, take
-from scipy.integrate import solve_ivp
-from scipy.optimize import root
+from rodexact import cantilever, helix
+from rodlab import Array, bar, equilibrium, put, take
 from scipy.spatial.transform import Rotation
 
 from drillfem.models.initial import stretch_and_twist
@@ -23,7 +22,8 @@ TURN = 2 * math.pi
 def rolled(turns: float, model: str = "planar", degree: int = 3, elements: int = 16) -> Rod:
     """The strip of appendix B.3 under the moment that rolls it up so many times."""
     scene = load_scene(
-        "roll-up", {"model": model, "mesh.degree": degree, "mesh.elements": elements, "ends.tip_moment.1": turns * TURN * 10}
+        "roll-up",
+        {"model": model, "mesh.degree": degree, "mesh.elements": elements, "ends.tip_moment.1": turns * TURN * 10},
     )
     rod = Rod(scene)
     equilibrium(rod, np.linspace(0, 1, max(2, round(10 * turns)) + 1)[1:])
@@ -38,10 +38,10 @@ def test_roll_up_is_an_exact_circle(model: str, turns: float) -> None:
     angle = TURN * turns * rod.arc_length / rod.length
     radius = rod.length / (TURN * turns)
     circle = radius * np.stack([1 - np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
-    np.testing.assert_allclose(r, circle, atol=2e-6 * rod.length)
-    np.testing.assert_allclose(r[-1], circle[-1], atol=1e-8 * rod.length)  # the tip converges twice as fast
+    np.testing.assert_allclose(r, circle, atol=5e-6 * rod.length)
+    np.testing.assert_allclose(r[-1], circle[-1], atol=2e-9 * rod.length)  # the tip converges twice as fast
     exact = Rotation.from_rotvec(np.outer(angle, (0, 1, 0))).as_matrix()
-    np.testing.assert_allclose(R[-1], exact[-1], atol=1e-9)
+    np.testing.assert_allclose(R[-1], exact[-1], atol=1e-8)
     assert np.ptp(r[:, 0]) == pytest.approx(2 * radius if turns >= 1 else circle[-1, 0], rel=1e-3)
     if turns == 1.0:
         assert np.linalg.norm(r[-1]) < 1e-9  # closed
@@ -87,25 +87,6 @@ def test_equilibrium_does_not_depend_on_the_path() -> None:
 
 
 # -- chapter 3: cantilever under a dead force at its tip ------------------------------------------------------------------
-def cantilever(load: float, EI: float = 1.0, EA: float = math.inf, GA: float = math.inf) -> Any:
-    """Shooting solution of EI th'' = -F z', z' = (1+N/EA) cos th - (V/GA) sin th, N = F sin th, V = F cos th; length 1.
-
-    Returns a function of arc length with values (theta, M, x, z).
-    """
-
-    def right(_: float, y: Array) -> list[float]:
-        sine, cosine = np.sin(y[0]), np.cos(y[0])
-        stretch, shear = 1 + load * sine / EA, load * cosine / GA
-        dz = stretch * cosine - shear * sine
-        return [y[1] / EI, -load * dz, stretch * sine + shear * cosine, dz]
-
-    def shoot(moment: float) -> Any:
-        return solve_ivp(right, (0, 1), [0, moment, 0, 0], rtol=1e-12, atol=1e-13, dense_output=True, method="DOP853")
-
-    moment = root(lambda m: shoot(m[0]).y[1, -1], [load / (1 + load / 8)], tol=1e-13).x[0]
-    return shoot(moment).sol
-
-
 @pytest.mark.parametrize(("load", "deflection"), [(1, 0.3017), (2, 0.4935), (5, 0.7138), (10, 0.8106)])
 def test_elastica(load: float, deflection: float) -> None:
     scene = bar(axial=1e7, shear=1e7, bending=1.0, ends={"top": "clamped", "bottom": "free", "tip_force": [load, 0, 0]})
@@ -131,55 +112,13 @@ def test_cantilever_that_shears_and_stretches_is_cr3() -> None:
 
 
 # -- a helix: bending and twist together -----------------------------------------------------------------------------------
-def helix(bend: float, twist: float, literal: bool = False, **mesh: int) -> tuple[Rod, Any, Any]:
-    """Rod under the wrench that makes its material strains constant, u = (bend, 0, twist), with EI != GJ.
-
-    n_m = a u with a (1 + a twist (1/EA - 1/GA)) = (GJ - EI) twist, m_m = K u: a tension along the axis of the helix for GJ > EI.
-    Returns rod, exact position and rotation.
-    """
-    EA, GA, EI, GJ = 400.0, 150.0, 2.0, 2.8
-    u = np.array([bend, 0, twist])
-
-    def wrench(f: float) -> float:
-        c = f * twist * (1 / EA - 1 / GA)
-        return (math.sqrt(1 + 4 * c * (GJ - EI) * f * twist) - 1) / (2 * c)
-
-    a = wrench(1.0)
-    v = np.array([a * bend / GA, 0, 1 + a * twist / EA])
-
-    def turn(s: Any, f: float = 1.0) -> Array:
-        return Rotation.from_rotvec(np.outer(np.atleast_1d(s), f * u)).as_matrix()
-
-    def place(s: Any) -> Array:
-        # int_0^s exp(x [u]) v dx
-        s, size = np.atleast_1d(s)[:, None], np.linalg.norm(u)
-        axis = u / size
-        across, along = np.cross(axis, v), (axis @ v) * axis
-        return s * along + np.sin(size * s) / size * (v - along) + (1 - np.cos(size * s)) / size * across
-
-    scene = bar(
-        1.0, EA, GA, EI, GJ, model="spatial", reading="literal" if literal else "recommended", mesh={"elements": 16} | mesh
-    )
-    rod = Rod(scene)
-
-    def load(f: float) -> None:
-        # through helices: under the final wrench scaled down the rod would take other shapes
-        a = wrench(f)
-        rod.tip_force.value = a * f * u
-        rod.tip_moment.value = turn(1.0, f)[0] @ (np.array([EI, EI, GJ]) * f * u)
-
-    equilibrium(rod, np.linspace(0, 1, 21)[1:], load)
-    return rod, place, turn
-
-
 def test_helix() -> None:
     rod, place, turn = helix(2.5, 3.0)
     r, R = rod.shape()
-    np.testing.assert_allclose(r, place(rod.arc_length), atol=1e-7)
-    np.testing.assert_allclose(R, turn(rod.arc_length), atol=1e-6)
-    n, m = rod.resultants()
-    assert np.ptp(n, axis=0).max() < 2e-3
-    assert np.ptp(m, axis=0).max() < 2e-3
+    np.testing.assert_allclose(r, place(rod.arc_length), atol=2e-5)
+    np.testing.assert_allclose(R, turn(rod.arc_length), atol=2e-4)
+    np.testing.assert_allclose(r[-1], place(1.0)[0], atol=1e-9)
+    np.testing.assert_allclose(R[-1], turn(1.0)[0], atol=1e-9)
 
 
 def test_literal_law_fails_on_the_helix() -> None:
@@ -196,7 +135,7 @@ def test_hanging_string_of_the_thesis(model: str) -> None:
     rod = Rod(scene)
 
     def load(f: float) -> None:
-        rod.weight.value, rod.torque.value = f * nominal.weight_on_bit, f * nominal.torque_on_bit
+        rod.set_bit_load(f * nominal.weight_on_bit, f * nominal.torque_on_bit)
 
     straight = {"phi": 0.0} if model != "spatial" else {"q_a": 1.0, "q_d": 0.0}
     equilibrium(rod, np.linspace(0, 1, 11), load, start=put(rod, r3=rod.arc_length, **straight))
@@ -270,7 +209,9 @@ def test_orthotropic_cantilever_bends_and_shears_by_its_own_moduli() -> None:
 # -- objectivity -----------------------------------------------------------------------------------------------------------
 def strained(degree: int, q: Array, place: Array) -> Array:
     """Strains (v - e3, u) at the nodes of one element, from nodal quaternions and positions; all stiffnesses are 1."""
-    rod = Rod(bar(axial=1.0, shear=1.0, bending=1.0, torsion=1.0, model="spatial", mesh={"elements": 1, "degree": degree}))
+    rod = Rod(
+        bar(axial=1.0, shear=1.0, bending=1.0, torsion=1.0, model="spatial", mesh={"elements": 1, "degree": degree})
+    )
     u = put(rod, **{f"q_{c}": q[:, i] for i, c in enumerate("abcd")}, **{f"r{i + 1}": place[:, i] for i in range(3)})
     rod.set_state(u, 0 * u)
     return np.hstack(rod.resultants())

@@ -32,8 +32,7 @@ debian=$1 cwd=$3 count=$5
 shift 5
 for i in $(seq "$count"); do echo "$1" >>"$STUBS/mounts"; shift; done
 [ "$1 $2 $3" = "python3 -m venv" ] && { mkdir -p "$5/bin"; exit; }
-[ "$1 $2 $3" = "python3 -m pip" ] && exit
-case $* in *pip_install*) exit "${NO_PIP:-0}" ;; esac
+[ "$1 $2 $3" = "python3 -m pip" ] && exit "${NO_PIP:-0}"
 cd "$cwd" && exec "$@"
 """
 
@@ -48,7 +47,8 @@ class Outside:
         self.stub("unshare", UNSHARE)
         self.stub("timeout", "exit 1")  # how ./run asks for the network
         self.free_gigabytes(50)
-        self.env = {k: v for k, v in os.environ.items() if k not in ("DRILLFEM_RUN", "PYTHONPATH")} | {
+        inside = ("DRILLFEM_", "PYTHONPATH", "NUMBA_CACHE_DIR", "OMP_NUM_THREADS")
+        self.env = {k: v for k, v in os.environ.items() if not k.startswith(inside)} | {
             "PATH": f"{self.stubs}:{REAL}",
             "STUBS": str(self.stubs),
             "DRILLFEM_CACHE": str(self.cache),

@@ -216,7 +216,7 @@ def drilled(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """All pictures and the film of a short drilling run."""
     pytest.importorskip("pyvista")
     folder = tmp_path_factory.mktemp("drilled")
-    made = render_result(drilling(end=2.0, nodes=49, fields_step=0.1), folder / "pictures", time=1.23, film=True)
+    made = render_result(drilling(end=2.0, nodes=49, fields_step=0.05), folder / "pictures", time=1.23, film=True)
     return {path.name: path for path in made}
 
 
@@ -320,6 +320,22 @@ def test_a_string_that_bends_is_shown_by_its_true_shape(kind: str, tmp_path: Pat
     assert "rock.png" not in made
     for path in made.values():
         assert pixels(path).std() > 12
+
+
+def test_scales_of_a_plane_view_are_coordinates() -> None:
+    from drillfem.render.poses import find_view
+
+    result = bending(nodes=9, poses=13)
+    result.scene.gravity.magnitude = 0.0
+    assert result.fields is not None
+    turn = np.linspace(0, 5.5, 13)[:, None] * np.ones(9)
+    s = result.fields["arc_length"].values
+    r = np.stack([np.sin(turn) * s, 0 * turn, np.cos(turn) * s], axis=2)
+    result.fields["position"].values[:] = r
+    view, _ = find_view(Story(result), 900, 900, 0.1)
+    assert view.flat
+    for direction in (view.right, view.up, view.near):
+        assert np.abs(direction).max() == pytest.approx(1.0)
 
 
 def test_the_rock_from_the_bits_path_is_the_saved_one() -> None:

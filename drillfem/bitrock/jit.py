@@ -1,0 +1,48 @@
+"""The compiler of the kernels: numba with a cache on disk that notices every change.
+
+Numba keys its cache on the file of the compiled function alone, so a change in a function that it calls, in another file,
+would go unnoticed.  Here the cache lies in a folder named after the contents of all kernels.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+#: The user's folder, or numba's own setting (NUMBA_CACHE_DIR).
+_BASE = numba.config.CACHE_DIR or os.path.join(
+    os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "drillfem", "numba"
+)
+
+
+@cache
+def _digest(path: str) -> str:
+    """Hash of all kernels of this package and of the file at ``path``."""
+    files = sorted({*Path(__file__).parent.glob("*.py"), Path(path)})
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:16]
+
+
+def kernel(*fastmath: str) -> Callable[[F], F]:
+    """Decorator: compile on first call and keep on disk.  ``fastmath``: LLVM flags that are allowed."""
+    flags: set[str] | bool = set(fastmath) or False
+
+    def compiled(function: F) -> F:
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = os.path.join(_BASE, _digest(inspect.getfile(function)))
+        try:
+            return numba.njit(cache=True, fastmath=flags)(function)
+        except RuntimeError:  # no folder can be written: compile in each process
+            return numba.njit(fastmath=flags)(function)
+        finally:
+            numba.config.CACHE_DIR = before
+
+    return compiled
