@@ -112,9 +112,12 @@ def run(
     ] = None,
     until: Until = None,
     certify: Annotated[
-        bool,
-        typer.Option("--certify", help="Repeat with half the step, a finer mesh, nearby starts; compare."),
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--certify/--no-certify",
+            help="Repeat with half the step, a finer mesh, nearby starts; compare. Default: where it takes seconds.",
+        ),
+    ] = None,
 ) -> None:
     """Simulate a scene."""
     from drillfem.results import check_new_folder
@@ -129,9 +132,11 @@ def run(
         with ProgressDisplay() as progress:
             result = drillfem.simulate(loaded, out=out, progress=progress, until=end)
         companions = None
-        if certify:
+        # a straight drilling string costs seconds: its numbers never come without what they are worth
+        if certify or (certify is None and result.summary.get("engine") == "condensed"):
             from drillfem.solve import certify as repeat
 
+            print("again with half the step, a finer mesh and nearby starts (--no-certify leaves this out)")
             companions = repeat(loaded, end)
         _report(result, companions)
 

@@ -73,7 +73,7 @@ class Ansatz:
         return v
 
     def constraint(self, x: Expr, test: Expr) -> Expr | None:
-        """What the configuration must satisfy besides equilibrium, tested with what :meth:`virtual` leaves of ``test``."""
+        """What the configuration must satisfy besides equilibrium, tested with what :meth:`virtual` leaves over."""
         return None
 
 

@@ -222,8 +222,8 @@ def static_terms(
 ) -> Terms:
     """Equilibrium in the configuration fields alone; x, test of shape (len(a.x_names),).
 
-    The ansatz' constraint (|q| = 1 at every node) closes the system; its rows carry the torsional stiffness, to have the
-    size of the others. It is no penalty: where |q| may differ between nodes, the rotation between them swerves.
+    The ansatz' constraint (|q| = 1 at every node) closes the system; its rows carry the torsional stiffness, to have
+    the size of the others. It is no penalty: where |q| may differ between nodes, the rotation between them swerves.
     """
     at = a.configuration(x, s)
     still = Twist(0 * at.r, 0 * at.u_m)

@@ -36,7 +36,7 @@ def cantilever(load: float, EI: float = 1.0, EA: float = math.inf, GA: float = m
 def helix(bend: float, twist: float, literal: bool = False, **mesh: int) -> tuple[Rod, Any, Any]:
     """Rod under the wrench that makes its material strains constant, u = (bend, 0, twist), with EI != GJ.
 
-    n_m = a u with a (1 + a twist (1/EA - 1/GA)) = (GJ - EI) twist, m_m = K u: a tension along the axis of the helix for GJ > EI.
+    n_m = a u with a (1 + a twist (1/EA - 1/GA)) = (GJ - EI) twist, m_m = K u: a tension along the axis for GJ > EI.
     Returns rod, exact position and rotation.
     """
     EA, GA, EI, GJ = 400.0, 150.0, 2.0, 2.8

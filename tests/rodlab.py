@@ -49,7 +49,7 @@ def hamilton(p: Any, q: Any) -> Any:
     )
 
 
-# -- scenes -----------------------------------------------------------------------------------------------------------
+# -- scenes ----------------------------------------
 def bar(
     length: float = 1.0,
     axial: float = 1e4,
@@ -61,7 +61,7 @@ def bar(
     retardation: float = 0.0,
     **tables: Any,
 ) -> Scene:
-    """A weightless uniform rod, clamped at the top, at rest. ``tables``: tables and keys that replace the default ones."""
+    """A weightless uniform rod, clamped at the top, at rest. ``tables`` replace the default ones."""
     section = {
         "name": "bar",
         "length": length,
@@ -89,9 +89,9 @@ def stepped(scene: Scene, step: float, **keys: Any) -> Time:
     return replace(scene.time, step=step, **keys)
 
 
-# -- states -----------------------------------------------------------------------------------------------------------
+# -- states ----------------------------------------
 def put(rod: Rod, u: Array | None = None, **components: Any) -> Array:
-    """Unknowns with named components set to nodal values (top down) or a function of arc length; others from ``u`` or the start."""
+    """Unknowns with named components set to nodal values (top down) or functions of s; rest from ``u`` or the start."""
     block = (initial_state(rod) if u is None else u).reshape(-1, rod.ansatz.size).copy()
     for name, value in components.items():
         block[rod.nodes, rod.ansatz.index(name)] = value(rod.arc_length) if callable(value) else value
@@ -120,7 +120,7 @@ def quaternions(R: Array) -> Array:
     return q
 
 
-# -- statics ----------------------------------------------------------------------------------------------------------
+# -- statics ----------------------------------------
 def equilibrium(
     rod: Rod,
     factors: Sequence[float] | Array = (1.0,),
@@ -146,9 +146,9 @@ def equilibrium(
     return result
 
 
-# -- errors -----------------------------------------------------------------------------------------------------------
+# -- errors ----------------------------------------
 def gauss(rod: Rod, n: int = 6, derivative: bool = False) -> tuple[Array, Array, Callable[[Array], Array]]:
-    """Gauss points (m,) and weights (m,) of the mesh, and the map from nodal values (top down) to values (slopes) there."""
+    """Gauss points (m,) and weights (m,) of the mesh; the map from nodal values (top down) to values, slopes there."""
     p = rod.scene.mesh.degree
     cells = np.arange(rod.scene.mesh.elements)[:, None] * p + np.arange(p + 1)
     x, w = np.polynomial.legendre.leggauss(n)

@@ -1,7 +1,7 @@
 """The compiler of the kernels: numba with a cache on disk that notices every change.
 
-Numba keys its cache on the file of the compiled function alone, so a change in a function that it calls, in another file,
-would go unnoticed.  Here the cache lies in a folder named after the contents of all kernels.
+Numba keys its cache on the file of the compiled function alone, so a change in a function that it calls, in another
+file, would go unnoticed.  Here the cache lies in a folder named after the contents of all kernels.
 """
 
 from __future__ import annotations

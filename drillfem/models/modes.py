@@ -1,10 +1,11 @@
-"""Natural frequencies of a rod about an equilibrium: small vibrations K x + C x-dot + M x-ddot = 0 of the one weak form."""
+"""Natural frequencies of a rod: small vibrations K x + C x-dot + M x-ddot = 0 of the one weak form."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import scipy.sparse as sp
 from petsc4py import PETSc
 from scipy.sparse.linalg import eigs
@@ -23,8 +24,8 @@ FAMILIES = {"axial": ("v3",), "torsional": ("w3",), "bending": ("v1", "v2", "w1"
 class Modes:
     """Vibrations of one family, slowest first; motions of the unstrained rod (frequency zero) are left out.
 
-    ``frequency`` (n,) in Hz; ``damping`` (n,): ratio to critical damping, c_d omega/2 for one Kelvin-Voigt time (spec 3.3);
-    ``shape`` (n, nodes, fields): nodal velocities from the top down, components ordered as ``ansatz.v_names``.
+    ``frequency`` (n,) in Hz; ``damping`` (n,): ratio to critical damping, c_d omega/2 for one Kelvin-Voigt time
+    (spec 3.3); ``shape`` (n, nodes, fields): nodal velocities from the top down, components as ``ansatz.v_names``.
     """
 
     frequency: Array
@@ -64,8 +65,8 @@ def linearise(rod: Rod, u: Array) -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_
 def natural_frequencies(rod: Rod, count: int = 10, u: Array | None = None) -> dict[str, Modes]:
     """The ``count`` slowest vibrations of each family about the equilibrium ``u`` (default: the start of the scene).
 
-    Keys: ``axial``, ``torsional``, ``bending``, those that the ansatz has; where they do not fall apart (a bent or curved
-    rod) the only key is ``coupled``. Gyroscopic terms of a turning string are left out: ``u`` is taken at rest.
+    Keys: ``axial``, ``torsional``, ``bending``, those that the ansatz has; where they do not fall apart (a bent or
+    curved rod) the only key is ``coupled``. Gyroscopic terms of a turning string are left out: ``u`` is taken at rest.
     Raises SimulationError if the loads are not conservative (a dead moment on a rod that can bend).
     """
     K, C, M = linearise(rod, initial_state(rod) if u is None else u)
@@ -104,7 +105,7 @@ def natural_frequencies(rod: Rod, count: int = 10, u: Array | None = None) -> di
     return out
 
 
-def _uncoupled(K: sp.csr_matrix, families: dict[str, Array]) -> bool:
+def _uncoupled(K: sp.csr_matrix, families: dict[str, npt.NDArray[np.int64]]) -> bool:
     """Whether the stiffness has no entries between the families."""
     size = {k: abs(K[i][:, i]).max() for k, i in families.items()}
     return all(

@@ -693,9 +693,21 @@ class CondensedString:
         times = self.step * np.arange(self.count, self.count + steps + 1)
         top = np.stack(self._top(np.asarray(times, np.float64)), axis=1)
         rows = np.empty(((self.count + steps) // every - self.count // every, len(OUTPUTS)))
-        state = (self._axial, self._torsion, self._modes, self._s)
-        run = (self.count, self.step, self.parts, top, self.hook_load, every, rows)
-        _march(self._par, self.surface.data, *state, *run)
+        _march(
+            self._par,
+            self.surface.data,
+            self._axial,
+            self._torsion,
+            self._modes,
+            self._s,
+            self.count,
+            self.step,
+            self.parts,
+            top,
+            self.hook_load,
+            every,
+            rows,
+        )
         self.count += steps
         rows -= self._offset
         return dict(zip(OUTPUTS, np.ascontiguousarray(rows.T), strict=True))

@@ -29,6 +29,8 @@ _TOLERANCE = {"r": 1e-9, "q": 1e-10, "t": 1e-10, "p": 1e-10, "v": 1e-8, "w": 1e-
 _MAX_ITERATIONS = 25
 #: contraction above which the kept Jacobian is renewed for the next solve, and at once
 _SLOW, _STALLED = 0.1, 0.5
+#: iterations that a kept Jacobian may still need
+_PATIENCE = 5
 
 
 class BitLoad(Protocol):
@@ -242,7 +244,7 @@ class BitCoupledNewton:
             values[:] = 3 * (x1 - x2) + x3
         f = self._residual
         reason = PETSc.SNES.ConvergedReason.DIVERGED_MAX_IT
-        previous, renew_after = np.inf, False
+        previous, renew_after, keep = np.inf, False, self.keep
         # where to go back to when a kept Jacobian leads astray: behind the last update that can be trusted
         trusted, trusted_load, first = values.copy(), self._load.copy(), True
         for iteration in range(_MAX_ITERATIONS):
@@ -253,7 +255,7 @@ class BitCoupledNewton:
                 self.only_shift = False
                 if abs(self.shift - self._factored_shift) > 1e-10 * self.shift:
                     self._renew = True
-            fresh = self._renew or not self.keep
+            fresh = self._renew or not keep
             if fresh:
                 self._factorise(snes, x)
                 self._contraction = 1.0
@@ -281,14 +283,16 @@ class BitCoupledNewton:
                     if not fresh and self._contraction > _STALLED:
                         values[:] = trusted
                         rod.set_bit_load(*trusted_load)
-                        self._renew = first = True
+                        keep, first = False, True
                         continue
-                    self._renew = self._contraction > _STALLED
+                    # or when it would take too many more iterations
+                    self._renew = self._contraction > _STALLED or size * self._contraction**_PATIENCE > 1.0
                     renew_after = renew_after or self._contraction > _SLOW
                 else:
                     self._contraction = min(self._contraction, size / previous)
-            # what is left after this update is contraction/(1 - contraction) of it. The Jacobian of a drilling string turns
-            # with it and contracts as it did in the last solve, with a margin; of any other rod it is not trusted so far
+            # what is left after this update is contraction/(1 - contraction) of it. The Jacobian of a drilling string
+            # turns with it and contracts as it did in the last solve, with a margin; that of another rod goes stale
+            # with every step, and its contraction tells of the fast components only
             if bit is None:
                 rate = 1.0
             else:

@@ -19,7 +19,7 @@ SHIFT = 40.0
 
 @cache
 def pipe(case: str) -> Rod:
-    """Two sections of damped pipe; where the ansatz can bend, pressed against the wall of a hole and loaded at the tip."""
+    """Two sections of damped pipe; where the ansatz can bend, in a hole and loaded at the tip."""
     model = "spatial" if case == "literal" else case
     across = model in ("spatial", "planar")
     section: dict[str, Any] = {"outer_diameter": 0.1, "inner_diameter": 0.08}
@@ -41,7 +41,7 @@ def pipe(case: str) -> Rod:
 
 
 def state(rod: Rod, seed: int = 3) -> tuple[Array, Array]:
-    """A smooth random motion, in contact all along where there is a wall (the normal force has a kink at first touch)."""
+    """A smooth random motion, in contact all along where there is a wall (first touch is a kink)."""
     rng = np.random.default_rng(seed)
     u = put(rod, **{n: wave(rng, rod.length, 0.3) for n in rod.ansatz.v_names})
     block = u.reshape(-1, rod.ansatz.size)

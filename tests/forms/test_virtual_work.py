@@ -1,4 +1,4 @@
-"""The section law and the named terms: what a tilt does to the literal law, and that every ansatz restricts the same terms."""
+"""The section law and the named terms: the literal law loses stiffness, and every ansatz restricts the same terms."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_friction_peaks_at_the_static_coefficient() -> None:
     assert float(at(vw.friction_coefficient(ufl.as_ufl(1e3), wall))) * 1e3 == pytest.approx(0.15, rel=1e-3)
 
 
-# -- one weak form, restricted --------------------------------------------------------------------------------------
+# -- one weak form, restricted ----------------------------------------
 ANGLE = ufl.sin(2 * S + T)
 R1, R3 = ufl.sin(S * T), S + T * ufl.cos(S) / 5
 

@@ -1,4 +1,4 @@
-"""Natural frequencies against exact ones: the thesis' string (spec 8.5, 9.7), beams, a chain of terms that must stiffen."""
+"""Natural frequencies against exact ones: the thesis' string (spec 8.5, 9.7), beams, tension and buckling."""
 
 from __future__ import annotations
 

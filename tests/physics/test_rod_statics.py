@@ -86,7 +86,16 @@ def test_equilibrium_does_not_depend_on_the_path() -> None:
         np.testing.assert_allclose(tip, tips[0], atol=1e-9)
 
 
-# -- chapter 3: cantilever under a dead force at its tip ------------------------------------------------------------------
+def test_equilibrium_is_a_rest_of_the_dynamics() -> None:
+    rod = Rod(load_scene("bend-45"))
+    equilibrium(rod, np.arange(1, 9) / 8)
+    out = np.zeros(rod.size)
+    rod.residual(0.0, rod.u.x.array.copy(), np.zeros(rod.size), out)
+    assert abs(out).max() < 1e-8 * abs(rod.reaction).max()
+    assert rod.reaction[0:3] == pytest.approx([0, -600, 0], abs=1e-6)  # held r1, r2, r3: the load comes back
+
+
+# -- chapter 3: cantilever under a dead force at its tip ----------------------------------------
 @pytest.mark.parametrize(("load", "deflection"), [(1, 0.3017), (2, 0.4935), (5, 0.7138), (10, 0.8106)])
 def test_elastica(load: float, deflection: float) -> None:
     scene = bar(axial=1e7, shear=1e7, bending=1.0, ends={"top": "clamped", "bottom": "free", "tip_force": [load, 0, 0]})
@@ -111,7 +120,7 @@ def test_cantilever_that_shears_and_stretches_is_cr3() -> None:
     assert abs(r[-1, 0] - 0.7411) > 0.02
 
 
-# -- a helix: bending and twist together -----------------------------------------------------------------------------------
+# -- a helix: bending and twist together ----------------------------------------
 def test_helix() -> None:
     rod, place, turn = helix(2.5, 3.0)
     r, R = rod.shape()
@@ -126,7 +135,7 @@ def test_literal_law_fails_on_the_helix() -> None:
     assert np.linalg.norm(rod.shape()[0][-1] - place(1.0)[0]) > 0.05
 
 
-# -- the string at rest ----------------------------------------------------------------------------------------------------
+# -- the string at rest ----------------------------------------
 @pytest.mark.parametrize("model", ["axial-torsional", "spatial"])
 def test_hanging_string_of_the_thesis(model: str) -> None:
     scene = load_scene("vertical-c1-cd4", {"model": model, "top_drive.weight_on_bit": 68550})
@@ -157,7 +166,7 @@ def _weight_above(scene: Scene) -> tuple[Array, Array]:
     return np.array(scene.interfaces), np.cumsum([0.0, *weights])
 
 
-# -- locking ---------------------------------------------------------------------------------------------------------------
+# -- locking ----------------------------------------
 def bending_stiffness(degree: int, quadrature: str) -> float:
     """EI felt by a tip moment, relative to EI, of the thesis' drill pipe in elements of 12.5 m."""
     scene = load_scene("vertical-c1-cd4")
@@ -187,7 +196,7 @@ def test_linear_elements_lock_unless_integrated_with_one_point() -> None:
     assert bending_stiffness(3, "full") == pytest.approx(1.0, rel=1e-6)
 
 
-# -- sections that tell their directions apart -----------------------------------------------------------------------------
+# -- sections that tell their directions apart ----------------------------------------
 def test_orthotropic_cantilever_bends_and_shears_by_its_own_moduli() -> None:
     wood = {"C11": 12e9, "C12": 5e9, "C13": 6e9, "C22": 9e9, "C23": 4e9, "C33": 40e9, "C44": 0.3e9, "C55": 0.6e9}
     data = bar().to_dict() | {"model": "spatial", "material": {"density": 500, "elasticity": wood}}
@@ -206,7 +215,7 @@ def test_orthotropic_cantilever_bends_and_shears_by_its_own_moduli() -> None:
     assert R[1, 0] == pytest.approx(0.01 / k.torsion, rel=1e-5)
 
 
-# -- objectivity -----------------------------------------------------------------------------------------------------------
+# -- objectivity ----------------------------------------
 def strained(degree: int, q: Array, place: Array) -> Array:
     """Strains (v - e3, u) at the nodes of one element, from nodal quaternions and positions; all stiffnesses are 1."""
     rod = Rod(
