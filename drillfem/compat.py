@@ -18,6 +18,10 @@ import numpy.typing as npt
 from .errors import MissingDependency
 
 try:
+    import petsc4py
+
+    # signals are the program's: Ctrl-C keeps what was computed, a closed pipe is no crash
+    petsc4py.init(["drillfem", "-no_signal_handler"])
     import basix.ufl
     import dolfinx
     import dolfinx.fem.petsc
@@ -59,6 +63,10 @@ def jit_options() -> dict[str, Any]:
         "cffi_extra_compile_args": ["-O3", "-march=native", "-w"],
         "timeout": 300,
     }
+
+
+#: FFCx speaks up (to :class:`_Announce` alone) when it compiles rather than loads
+_VERBOSE = {"verbosity": logging.INFO}
 
 
 class _Announce(logging.Handler):
@@ -112,7 +120,7 @@ def compile_form(form: ufl.Form) -> dolfinx.fem.Form:
     with _announced():
         start = time.perf_counter()
         _announce.compiled = False
-        compiled = dolfinx.fem.form(form, jit_options=jit_options())
+        compiled = dolfinx.fem.form(form, form_compiler_options=_VERBOSE, jit_options=jit_options())
         if _announce.compiled:
             log.debug("compiled a form in %.1f s", time.perf_counter() - start)
     return compiled
@@ -121,7 +129,9 @@ def compile_form(form: ufl.Form) -> dolfinx.fem.Form:
 def compile_expression(expression: Any, points: Array, comm: MPI.Comm) -> dolfinx.fem.Expression:
     """Compile an expression for evaluation at reference points (n, 1)."""
     with _announced():
-        return dolfinx.fem.Expression(expression, points, comm=comm, jit_options=jit_options())
+        return dolfinx.fem.Expression(
+            expression, points, comm=comm, form_compiler_options=_VERBOSE, jit_options=jit_options()
+        )
 
 
 def lagrange(mesh: dolfinx.mesh.Mesh, degree: int, size: int) -> dolfinx.fem.FunctionSpace:

@@ -84,9 +84,9 @@ def dynamic(end: float, step: float, **keys: Any) -> dict[str, Any]:
     return {"end": end, "step": step, **keys}
 
 
-def stepped(scene: Scene, step: float, **keys: Any) -> Time:
-    """The scene's time table with another step and other keys."""
-    return replace(scene.time, step=step, **keys)
+def stepped(scene: Scene, step: float, integrator: str = "default", **keys: Any) -> Time:
+    """The scene's time table with another step, another integrator and other keys."""
+    return replace(scene.time, step=step, integrator=integrator, **keys)
 
 
 # -- states ----------------------------------------

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import logging
 import os
 from collections.abc import Callable
 from functools import cache
@@ -24,6 +25,16 @@ _BASE = numba.config.CACHE_DIR or os.path.join(
 )
 
 
+#: Cache folders of the kernels that are loaded.
+_folders: set[str] = set()
+
+
+def announce() -> None:
+    """Tell the user, through the logger ``drillfem``, when the next calls will compile: once, it takes a while."""
+    if any(not any(Path(folder).rglob("*.nbi")) for folder in _folders):
+        logging.getLogger("drillfem").info("compiling kernels, once")
+
+
 @cache
 def _digest(path: str) -> str:
     """Hash of all kernels of this package and of the file at ``path``."""
@@ -38,6 +49,7 @@ def kernel(*fastmath: str) -> Callable[[F], F]:
     def compiled(function: F) -> F:
         before = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = os.path.join(_BASE, _digest(inspect.getfile(function)))
+        _folders.add(numba.config.CACHE_DIR)
         try:
             return numba.njit(cache=True, fastmath=flags)(function)
         except RuntimeError:  # no folder can be written: compile in each process

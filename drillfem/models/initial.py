@@ -51,7 +51,7 @@ def initial_state(rod: Rod) -> Array:
     reference = scene.reference
     b = np.asarray(reference.bend_towards)
     if reference.radius is not None:
-        bend = s / reference.radius
+        bend = np.asarray(s / reference.radius, dtype=np.float64)
         offset = reference.radius * (1 - np.cos(bend))
         state["r1"], state["r2"] = offset * b[0], offset * b[1]
         state["r3"] = reference.radius * np.sin(bend)

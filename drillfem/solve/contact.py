@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..bitrock.jit import announce
 from ..bitrock.law import BitLaw
 from ..bitrock.solve import bit_step
 from ..bitrock.surface import RockSurface
@@ -46,6 +47,7 @@ class RockContact:
     @classmethod
     def from_scene(cls, scene: Scene) -> RockContact:
         """Rock of a scene, in nominal drilling; DG operators come from the UFL form."""
+        announce()
         return cls(BitLaw.from_scene(scene), surface_of(scene), scene.top_drive.speed or 0.0)
 
     def at_rest(self, speed: float, spin: float, depth: float) -> tuple[float, float]:

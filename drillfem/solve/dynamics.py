@@ -93,6 +93,7 @@ class Stepper:
         ts.setTime(self.time.start)
         ts.setTimeStep(self.time.step)
         self._alpha = ts.getType() == PETSc.TS.Type.ALPHA
+        self.newton.extrapolate = ts.getType() != PETSc.TS.Type.ARKIMEX
         self.rejected = 0
         self._trouble = 0
         self._restart = True

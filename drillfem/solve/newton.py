@@ -16,10 +16,10 @@ from __future__ import annotations
 import math
 from typing import Any, Protocol
 
-import numba
 import numpy as np
 from petsc4py import PETSc
 
+from ..bitrock.jit import kernel
 from ..compat import Array
 from ..forms.ansatz import Spatial
 from ..models.rod import Rod
@@ -51,7 +51,7 @@ class BitLoad(Protocol):
         ...
 
 
-@numba.njit(cache=True)
+@kernel()
 def _turns(reference: Array, now: Array, cosine: Array, sine: Array) -> None:
     """Half angle of the turn about d3 between two sets of nodal quaternions (n, 4): cosine and sine (n,)."""
     for i in range(len(now)):
@@ -63,7 +63,7 @@ def _turns(reference: Array, now: Array, cosine: Array, sine: Array) -> None:
         sine[i] = along / size if size > 0 else 0.0
 
 
-@numba.njit(cache=True)
+@kernel()
 def _turn(y: Array, cosine: Array, sine: Array, way: float) -> None:
     """Turn nodal blocks (r, q, v, w) of y (n, 13) about their own axis, in place; ``way`` = -1 is the inverse."""
     for i in range(len(y)):
@@ -76,7 +76,7 @@ def _turn(y: Array, cosine: Array, sine: Array, way: float) -> None:
         y[i, 10], y[i, 11] = w0 * c2 + w1 * s2, w1 * c2 - w0 * s2
 
 
-@numba.njit(cache=True)
+@kernel()
 def _weighted(delta: Array, weight: Array) -> float:
     """Largest |delta| in units of its tolerance."""
     worst = 0.0
@@ -113,6 +113,8 @@ class BitCoupledNewton:
         self.only_shift = False
         #: d(stage)/d(unknown): generalised-alpha solves for the end of the step, evaluates inside it
         self.stage_fraction = 1.0
+        #: start from the last three solutions; no guide where a step has several stages
+        self.extrapolate = True
         #: where the bit was at the last accepted step
         self.start_rotation: Any = 0.0
         self.start_depth = 0.0
@@ -239,7 +241,7 @@ class BitCoupledNewton:
         """Newton iterations from the extrapolated start; sets the converged reason of ``snes``."""
         rod, bit = self.rod, self.bit
         values = x.getArray()
-        if len(self._history) == 3:
+        if self.extrapolate and len(self._history) == 3:
             x1, x2, x3 = self._history
             values[:] = 3 * (x1 - x2) + x3
         f = self._residual

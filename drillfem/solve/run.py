@@ -31,17 +31,17 @@ def _run(scene: Scene, out: Path | None, until: float | None, progress: Progress
     if not end > scene.time.start:
         raise SceneError(f"until = {end:g} s: must be later than the start of the scene, {scene.time.start:g} s")
     engine = engine_of(scene)
-    began, first = time.perf_counter(), [scene.time.start]
+    began: list[float] = []
 
     def tell(t: float) -> None:
-        if progress is not None:
-            wall = time.perf_counter() - began
-            progress(t, end, (t - first[0]) / wall if wall > 0 else 0.0)
+        # the pace counts from the first sign of life: compiling and setting up are not simulating
+        if not began:
+            began.extend((t, time.perf_counter()))
+        elif progress is not None:
+            progress(t, end, (t - began[0]) / max(time.perf_counter() - began[1], 1e-9))
 
     def writer(model: str, dofs: int, variables: dict[str, str]) -> ResultWriter:
         w = ResultWriter(out, scene, model, dofs, variables, resume)
-        if w.restart is not None:
-            first[0] = w.restart[0]
         w.update(engine=engine)
         return w
 

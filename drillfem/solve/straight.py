@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..bitrock.jit import announce
 from ..bitrock.law import BitLaw
 from ..bitrock.surface import RockSurface
 from ..compat import Array
@@ -30,6 +31,7 @@ class StraightRun:
     """A scene's string in the condensed engine, with the fields and the history of a rod."""
 
     def __init__(self, scene: Scene) -> None:
+        announce()
         rod = self.rod = Rod(scene)
         u0 = initial_state(rod)
         axial, torsional = matrices(rod)

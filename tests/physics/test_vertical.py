@@ -1,7 +1,7 @@
 """Chapter 6, C1: the vertical string drills. The thesis' behaviour at four dampings, and what the numbers rest on.
 
-The motion is chaotic at 1e-4 and 1e-5 s: what is asserted there held in every one of nine nearby starts at steps of 1, 0.5,
-0.25 and 0.1 ms (docs/vertical-c1.md).
+The motion is chaotic at 1e-4 and 1e-5 s: what is asserted there held in every one of nine nearby starts, at steps of
+1 and 0.25 ms (docs/vertical-c1.md).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Array = npt.NDArray[np.float64]
 
 S1, S2, S3 = (0.0, 20.0), (90.0, 110.0), (180.0, 200.0)
 SPIN, ADVANCE = "bit_angular_speed", "bit_axial_speed"
-#: Torque on bit in nominal drilling (spec 7.6), and the mean that the lumped model M1 gives for the same string (5.5.5).
+#: Torque on bit in nominal drilling (5-28), and the mean of the lumped model M1 on the same string (section 5.5.5).
 NOMINAL_TORQUE, LUMPED_TORQUE = 3264.0, 3295.0
 PETSC = {"model": "axial-torsional", "time.engine": "petsc"}
 
@@ -66,7 +66,7 @@ def published_peak(damping: str, name: str, window: tuple[float, float]) -> floa
 def test_cd2_everything_dies_out() -> None:
     result = thesis("cd2")
     assert published_peak("cd2", SPIN, S1) == pytest.approx(0.45, abs=0.001)
-    # the first torsional vibration (spec 8.5), nothing else, in both directions
+    # the first torsional vibration (fixed top, free bit), nothing else, in both directions
     for name in (SPIN, ADVANCE):
         (only,) = waves("cd2", name, S1)
         assert only.frequency == pytest.approx(0.453, rel=0.01)
@@ -219,13 +219,20 @@ def error(step: float, **overrides: Any) -> float:
     return abs(float(run.history["bit_angle"][-1] - reference().history["bit_angle"][-1]))
 
 
-@pytest.mark.parametrize("integrator", ["default", "generalized-alpha", "theta", "bdf", "exact"])
+@pytest.mark.parametrize("integrator", ["generalized-alpha", "theta", "bdf", "exact"])
 def test_integrators_are_of_second_order_while_drilling(integrator: str) -> None:
     engine = {} if integrator == "exact" else PETSC
     coarse, fine = (error(step, **engine, **{"time.integrator": integrator}) for step in (5e-4, 2.5e-4))
     assert 3.2 < coarse / fine < 5.0
     # the condensed string is exact but for the bit's force within a step
     assert fine < (1e-8 if integrator == "exact" else 5e-7)
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_arkimex_drills(order: int) -> None:
+    # PETSc begins it with a step of h/100, by which it may be late
+    step = 2.5e-4
+    assert error(step, **PETSC, **{"time.integrator": "arkimex", "time.order": order}) < 0.012 * step * 15.9
 
 
 def test_both_engines_tend_to_the_same_motion() -> None:
@@ -263,7 +270,10 @@ def test_unequal_blades() -> None:
     assert max(differences(one, other, "depth_of_cut")) < 1e-3
     even = drillfem.simulate(scene(**keys, **{"bit.blades": 3}), until=0.6)
     assert differences(one, even, "depth_of_cut")[0] > 1e-3
-    equal = drillfem.simulate(scene(**keys, **{"bit.blades": 3, "bit.blade_angles": [0.0, 120.0 / 180 * np.pi, 240.0 / 180 * np.pi]}), until=0.6)
+    equal = drillfem.simulate(
+        scene(**keys, **{"bit.blades": 3, "bit.blade_angles": [0.0, 120.0 / 180 * np.pi, 240.0 / 180 * np.pi]}),
+        until=0.6,
+    )
     assert max(differences(equal, even, "depth_of_cut", "bit_angle")) < 1e-9
 
 
@@ -278,7 +288,7 @@ def test_the_printed_law_drives_a_bit_that_turns_backwards() -> None:
 
 
 def test_the_printed_start_is_violent() -> None:
-    """Untwisted, with a nominal torque at the bit (errata 48)."""
+    """Untwisted, with a nominal torque at the bit (6-4)."""
     violent = drillfem.simulate(scene(**{"initial.state": "literal"}), until=1.0).history
     assert violent[SPIN].values.min() < 6.0 < 13.0 < thesis("cd4").history[SPIN].values[:1000].min()
 

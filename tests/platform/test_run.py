@@ -32,7 +32,7 @@ debian=$1 cwd=$3 count=$5
 shift 5
 for i in $(seq "$count"); do echo "$1" >>"$STUBS/mounts"; shift; done
 [ "$1 $2 $3" = "python3 -m venv" ] && { mkdir -p "$5/bin"; exit; }
-[ "$1 $2 $3" = "python3 -m pip" ] && exit "${NO_PIP:-0}"
+[ "$1 $2 $3" = "python3 -m pip" ] && { echo "${PIP_SAYS-}"; exit "${NO_PIP:-0}"; }
 cd "$cwd" && exec "$@"
 """
 
@@ -190,6 +190,11 @@ def test_no_network(outside: Outside) -> None:
 
 def test_no_package_index(outside: Outside) -> None:
     assert "no network: pypi.org" in refusal(outside.run("true", NO_PIP="1"))
+
+
+def test_certificate_of_a_network_that_looks_inside(outside: Outside) -> None:
+    outside.stub("timeout", "exit 0")
+    assert "set PIP_CERT" in refusal(outside.run("true", NO_PIP="1", PIP_SAYS="SSL: CERTIFICATE_VERIFY_FAILED"))
 
 
 def test_other_failures_name_the_log(outside: Outside) -> None:

@@ -142,22 +142,24 @@ def test_schemes_agree_on_the_volume_of_a_wild_history():
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_off_bottom_and_backwards_leave_the_rock_alone(scheme):
-    def shape(eta):
-        return 1e-4 * np.sin(6 * eta) ** 2
+@pytest.mark.parametrize("angles", [None, ANGLES])
+def test_off_bottom_and_backwards_leave_the_rock_alone(scheme, angles):
+    """A smooth hole bottom passes under the blades, forwards and backwards, round more than once, and stays itself."""
+    blades = np.array([0.0]) if angles is None else np.array(angles)
+    waves = 6 if angles is None else 5
 
-    surface = RockSurface(scheme, 6, degree=3, elements=16)
-    surface.set_profile([shape], knots=256)
-    deep = -1.0  # far above the rock
-    for turn in np.resize([0.03, -0.02, 0.05, -0.06], 200):
-        surface.commit(turn, deep, deep)
+    def bottom(angle):
+        return 1e-4 * np.sin(waves * angle) ** 2
+
+    surface = RockSurface(scheme, 6, angles, degree=3, elements=24)
+    surface.set_profile([lambda eta, a=a: bottom(a - eta) for a in blades], knots=256)
+    above, phi = -1.0, 0.0
+    for turn in [*np.resize([0.03, -0.02, 0.05, -0.08], 200), -0.4, 0.7, -5.0, 2 * np.pi]:
+        surface.commit(turn, above, above)
+        phi += turn
     assert surface.removed == pytest.approx(0.0, abs=1e-15)
-    eta, height = surface.profile()[0]
-    np.testing.assert_allclose(height, shape(eta), atol=2e-7)
-    # all the way round, in one turn of several sectors
-    surface.commit(2 * np.pi, deep, deep)
-    eta, height = surface.profile()[0]
-    np.testing.assert_allclose(height, shape(eta), atol=2e-7)
+    for a, (eta, height) in zip(blades, surface.profile(), strict=True):
+        np.testing.assert_allclose(height, bottom(a + phi - eta), atol=1e-6)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
