@@ -40,9 +40,7 @@ app = typer.Typer(
 stderr = Console(stderr=True, highlight=False)
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Result folder.")]
-SceneName = Annotated[
-    str, typer.Argument(metavar="SCENE", help="A built-in scene (drillfem list) or a TOML file.")
-]
+SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A built-in scene (drillfem list) or a TOML file.")]
 Until = Annotated[str | None, typer.Option(metavar="SECONDS", help="Stop at this simulated time.")]
 
 
@@ -89,9 +87,7 @@ def list_scenes() -> None:
 @app.command()
 def info(
     scene: SceneName,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key.")
-    ] = None,
+    set_: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key.")] = None,
 ) -> None:
     """Say what a scene simulates."""
     from drillfem.scene import describe, load_scene
@@ -159,9 +155,7 @@ def resume(folder: Folder, until: Until = None) -> None:
 @app.command()
 def render(
     folder: Folder,
-    time: Annotated[
-        str | None, typer.Option(metavar="SECONDS", help="Which moment; the last by default.")
-    ] = None,
+    time: Annotated[str | None, typer.Option(metavar="SECONDS", help="Which moment; the last by default.")] = None,
     field: Annotated[str | None, typer.Option(metavar="NAME", help="What colours the string.")] = None,
     film: Annotated[bool, typer.Option("--film", help="Make a film too.")] = False,
 ) -> None:

@@ -31,7 +31,8 @@ try:
 except ImportError as error:
     raise MissingDependency(
         f"this needs DOLFINx with PETSc ({error}): use ./run (sets it up), the Docker image, "
-        "`apt install python3-dolfinx-real python3-petsc4py-real` (Debian 13) or `conda install -c conda-forge fenics-dolfinx`"
+        "`apt install python3-dolfinx-real python3-petsc4py-real` (Debian 13) or "
+        "`conda install -c conda-forge fenics-dolfinx`"
     ) from None
 
 Array = npt.NDArray[np.float64]

@@ -16,7 +16,9 @@ def mass(L: Expr, test: Expr, dx: ufl.Measure) -> ufl.Form:
     return L * test * dx
 
 
-def transport(L: Expr, test: Expr, forward: bool, dx: ufl.Measure, interior: ufl.Measure, ends: ufl.Measure) -> ufl.Form:
+def transport(
+    L: Expr, test: Expr, forward: bool, dx: ufl.Measure, interior: ufl.Measure, ends: ufl.Measure
+) -> ufl.Form:
     """-(dL/deta, test) with upwind traces, without the inflow: M dL/dphi = transport + inflow.
 
     ``forward``: the bit drills (rock flows towards +eta); else it turns backward and the rock flows towards -eta.

@@ -200,9 +200,7 @@ def dynamic_terms(
     """
     (x, v), (x_dot, v_dot), (test_x, test_v) = a.split(u), a.split(u_dot), a.split(test)
     at = a.configuration(x, s)
-    terms = virtual_work(
-        at, a.twist(v, at), a.twist(v_dot, at), a.twist(test_v, at), section, loads, on, literal
-    )
+    terms = virtual_work(at, a.twist(v, at), a.twist(v_dot, at), a.twist(test_v, at), section, loads, on, literal)
     terms["kinematics"] = ufl.dot(test_x, x_dot - a.rate(x, v)) * on.nodal
     return terms
 

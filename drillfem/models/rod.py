@@ -339,9 +339,7 @@ class Rod:
 
     @cached_property
     def _powers(self) -> dict[str, ScalarForm]:
-        terms = vw.powers(
-            self.ansatz, self.u, self.u_dot, self.s, self.section, self.loads, self.on, self.literal
-        )
+        terms = vw.powers(self.ansatz, self.u, self.u_dot, self.s, self.section, self.loads, self.on, self.literal)
         power = {"damping": ScalarForm(terms["damping"])}
         if self.loads.wall is not None:
             power["wall"] = ScalarForm(terms["contact"] + terms["friction"])
@@ -398,8 +396,8 @@ class Rod:
     def resultants(self) -> tuple[Array, Array]:
         """Internal force (nodes, 3; N) and moment (nodes, 3; N m), material components.
 
-        Taken at the integration points, where they are accurate (at the nodes of a slender element they zigzag), carried
-        to the nodes by the polynomial through them, and averaged between elements.
+        Taken at the integration points, where they are accurate (at the nodes of a slender element they zigzag),
+        carried to the nodes by the polynomial through them, and averaged between elements.
         """
         cells = np.arange(self.mesh.topology.index_map(1).size_local, dtype=np.int32)
         values = self._resultants.eval(self.mesh, cells).reshape(len(cells), -1, 6)

@@ -29,9 +29,7 @@ def flatten(data: Mapping[str, Any], prefix: str = "") -> dict[str, np.ndarray]:
             continue
         array = np.array(value)
         if array.dtype.hasobject:
-            raise TypeError(
-                f"a checkpoint holds arrays, numbers and texts; {prefix}{key} is {type(value).__name__}"
-            )
+            raise TypeError(f"a checkpoint holds arrays, numbers and texts; {prefix}{key} is {type(value).__name__}")
         flat[prefix + key] = array
     return flat
 

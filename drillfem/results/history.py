@@ -83,13 +83,9 @@ class SeriesFile:
         self._keep: int | None = None
         if path is not None and path.exists():
             with h5netcdf.File(path, "r") as file:
-                missing = set(self.variables).symmetric_difference(
-                    set(file.variables) - {"time"} - set(self.static)
-                )
+                missing = set(self.variables).symmetric_difference(set(file.variables) - {"time"} - set(self.static))
                 if missing:
-                    raise ValueError(
-                        f"{path.name} has other variables than this run: {', '.join(sorted(missing))}"
-                    )
+                    raise ValueError(f"{path.name} has other variables than this run: {', '.join(sorted(missing))}")
                 self._read_ends(file, file.dimensions["time"].size)
 
     @property
@@ -113,9 +109,7 @@ class SeriesFile:
         if not row[0] > self.last_time:
             raise ValueError(f"time must increase: {time} s after {self.last_time} s")
         if not math.isfinite(sum(row)):
-            bad = next(
-                (n for n, v in zip(self._names, row[1:], strict=True) if not math.isfinite(v)), "a value"
-            )
+            bad = next((n for n, v in zip(self._names, row[1:], strict=True) if not math.isfinite(v)), "a value")
             raise SimulationError(f"{bad} is not finite at t = {time:g} s")
         self._rows.append(row)
         self.last_time = row[0]
@@ -199,9 +193,7 @@ class SeriesFile:
 
     def _wrong_names(self, values: Mapping[str, Any]) -> None:
         wrong = ", ".join(sorted(set(values).symmetric_difference(self._names)))
-        raise ValueError(
-            f"a row must have exactly the variables that were announced; missing or unknown: {wrong}"
-        )
+        raise ValueError(f"a row must have exactly the variables that were announced; missing or unknown: {wrong}")
 
     def _seal(self) -> None:
         """Turn the rows that came one by one into a block."""

@@ -71,9 +71,7 @@ def this_run() -> dict[str, Any]:
 def is_result(folder: Path) -> bool:
     """Whether ``folder`` holds a result of this package."""
     try:
-        return {"scene", "versions"} <= set(
-            json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-        )
+        return {"scene", "versions"} <= set(json.loads((folder / "manifest.json").read_text(encoding="utf-8")))
     except (OSError, ValueError):
         return False
 
@@ -94,9 +92,7 @@ def check_new_folder(folder: str | Path) -> Path:
         raise SceneError(f"{folder}: is not a folder; choose another one for the result")
     if is_result(path):
         how = f"drillfem resume {shlex.quote(str(folder))}"
-        raise SceneError(
-            f"{folder}: holds a result already; choose another folder, or continue it with: {how}"
-        )
+        raise SceneError(f"{folder}: holds a result already; choose another folder, or continue it with: {how}")
     if any(path.iterdir()):
         raise SceneError(f"{folder}: is not empty and not a result; choose another folder for the result")
     return path

@@ -93,9 +93,7 @@ def dominant(
     return peaks
 
 
-def dominant_in(
-    history: xr.Dataset, name: str, window: tuple[float, float] | None = None, n: int = 3
-) -> list[Peak]:
+def dominant_in(history: xr.Dataset, name: str, window: tuple[float, float] | None = None, n: int = 3) -> list[Peak]:
     """The strongest waves of a variable of a ``history`` between the times ``window`` (s); see `dominant`."""
     time, signal = evenly(history["time"].values, history[name].values)
     return dominant(signal, time[1] - time[0], window, n, start=time[0]) if len(time) > 1 else []

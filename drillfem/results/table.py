@@ -155,9 +155,7 @@ def summary_table(result: Result, companions: Mapping[str, Result] | None = None
     title = f"{summary['model']}, {summary['dofs']} unknowns, {summary['simulated_seconds']:g} s"
     if not summary["converged"]:
         title += f" ({summary['reason']})"
-    table = Table(
-        title=escape(title), title_justify="left", title_style="bold", box=box.SIMPLE, pad_edge=False
-    )
+    table = Table(title=escape(title), title_justify="left", title_style="bold", box=box.SIMPLE, pad_edge=False)
     table.add_column("", no_wrap=True)
     table.add_column("", no_wrap=True)
     columns = ["this run", *(["nominal"] if nominal else []), *single]

@@ -201,9 +201,7 @@ class ResultWriter:
         self._unlock()
         manifest = {} if self._folder is None else _json(self._folder / "manifest.json")
         fields = None if self._fields is None else self._fields.dataset()
-        return Result(
-            self._history.dataset(), dict(self._summary), fields, manifest, self._folder, self._scene
-        )
+        return Result(self._history.dataset(), dict(self._summary), fields, manifest, self._folder, self._scene)
 
     def _flush_if_due(self) -> None:
         if self._folder is not None and perf_counter() - self._flushed > self._interval:

@@ -72,11 +72,7 @@ class Slot:
         k = self.key
         limit = f" {k.bound.text}" if k.bound else ""
         if self.type is float:
-            return (
-                f"a number{limit}"
-                if k.unit == "1"
-                else f"a number{limit} in {k.unit}, or text with such a unit"
-            )
+            return f"a number{limit}" if k.unit == "1" else f"a number{limit} in {k.unit}, or text with such a unit"
         if self.type is int:
             return f"a whole number{limit}"
         if self.type is bool:
@@ -216,9 +212,7 @@ def _scalar(slot: Slot, value: Any, path: str) -> Any:
                     raise ValueError("is not finite")
                 if number and not 1e-30 < abs(number) < 1e30:  # keeps products of some of them finite
                     raise ValueError("is beyond all sizes that can be meant")
-                if (slot.type is float or float(number).is_integer()) and (
-                    k.bound is None or k.bound.holds(number)
-                ):
+                if (slot.type is float or float(number).is_integer()) and (k.bound is None or k.bound.holds(number)):
                     return slot.type(number)
         except (ValueError, OverflowError) as error:
             reason = f" ({shown(value)} {error})" if isinstance(error, ValueError) else " (too large)"

@@ -33,11 +33,7 @@ def nominal(scene: Scene) -> Nominal:
     load = drive.weight_on_bit if drive.weight_on_bit is not None else weight - (drive.hook_load or 0.0)
     flat = min(load, rock.contact_strength * bit.radius * bit.wear_flat_length)
     depth = (load - flat) / (rock.intrinsic_specific_energy * bit.radius * bit.inclination)
-    torque = (
-        (rock.intrinsic_specific_energy * bit.radius * depth + bit.friction * bit.geometry * flat)
-        * bit.radius
-        / 2
-    )
+    torque = (rock.intrinsic_specific_energy * bit.radius * depth + bit.friction * bit.geometry * flat) * bit.radius / 2
     return Nominal(depth, depth * (drive.speed or 0.0) / (2 * math.pi), torque, weight - load, load)
 
 
@@ -153,8 +149,7 @@ def describe(scene: Scene) -> list[tuple[str, str]]:
         rows.append(
             (
                 label + "stiffness",
-                f"EA {q(k.axial, 'N')}, GA {q(k.shear1, 'N')}, EI {q(k.bending1, 'N m²')}, "
-                f"GJ {q(k.torsion, 'N m²')}",
+                f"EA {q(k.axial, 'N')}, GA {q(k.shear1, 'N')}, EI {q(k.bending1, 'N m²')}, GJ {q(k.torsion, 'N m²')}",
             )
         )
         if s.mass_per_length > 0 and s.rotary_inertia > 0:

@@ -66,9 +66,7 @@ def _section(title: str, table: type) -> list[str]:
         allowed = slot.expects if not _table(slot.type) else "table, see below"
         allowed = allowed.removesuffix(f" in {unit}, or text with such a unit").removesuffix(f" in {unit}")
         default = (
-            "see below"
-            if _table(slot.type) and not slot.required and slot.default is not None
-            else _default(slot)
+            "see below" if _table(slot.type) and not slot.required and slot.default is not None else _default(slot)
         )
         lines.append(f"| `{name}` | {slot.key.doc} | {unit} | {allowed} | {default} |")
     return lines
@@ -86,9 +84,7 @@ def reference() -> str:
             inner = _table(slot.type)
             if (inner is not None and name != "material") or (inner is not None and not path):
                 inside = f"{path.strip('[]')}.{name}" if path else name
-                nested.append(
-                    (f"[[{inside}]]" if typing.get_origin(slot.type) is tuple else f"[{inside}]", inner)
-                )
+                nested.append((f"[[{inside}]]" if typing.get_origin(slot.type) is tuple else f"[{inside}]", inner))
         queue = nested + queue
     return "\n".join(lines) + "\n"
 

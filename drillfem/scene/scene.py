@@ -75,9 +75,7 @@ class Scene:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Scene:
         """Scene from nested plain data: parsed TOML, or what `to_dict` gave. Raises SceneError."""
-        scene = read(
-            cls, {"time": {}, **data}
-        )._completed()  # an absent [time] lacks its end, and shall say so
+        scene = read(cls, {"time": {}, **data})._completed()  # an absent [time] lacks its end, and shall say so
         for path, message in scene.problems():
             raise complaint(data, path, message)
         return scene
@@ -101,9 +99,7 @@ class Scene:
             time = replace(time, start=0.0, end=1.0, step=1.0 / time.load_steps)
         interval = self.output.interval or time.step
         fields = self.output.fields_interval or max(interval, (time.end - time.start) / 20)
-        string = tuple(
-            s if s.stiffness or s.material else replace(s, material=self.material) for s in self.string
-        )
+        string = tuple(s if s.stiffness or s.material else replace(s, material=self.material) for s in self.string)
         name = self.name or "scene"
         return replace(
             self,
@@ -128,11 +124,7 @@ class Scene:
     @property
     def mass(self) -> float:
         """Mass in kg of the string with the lumps at its ends."""
-        return (
-            math.fsum(s.mass_per_length * s.length for s in self.string)
-            + self.ends.top_mass
-            + self.ends.bottom_mass
-        )
+        return math.fsum(s.mass_per_length * s.length for s in self.string) + self.ends.top_mass + self.ends.bottom_mass
 
     @property
     def weight(self) -> float:
@@ -223,8 +215,7 @@ class Scene:
             if hole is not None and s.outer_diameter is not None and hole <= s.outer_diameter:
                 yield (
                     "hole.diameter",
-                    f"must be larger than {here}.outer_diameter = {s.outer_diameter:g} m "
-                    f"of section {s.name!r}",
+                    f"must be larger than {here}.outer_diameter = {s.outer_diameter:g} m of section {s.name!r}",
                 )
             if self.contact is not None and s.outer_diameter is None:
                 yield f"{here}.outer_diameter", "must be given in m for contact"
@@ -414,8 +405,7 @@ def _override(data: dict[str, Any], dotted: str, value: Any) -> None:
     parts = dotted.split(".")
     if not all(p.strip() for p in parts):
         raise SceneError(
-            f"override {dotted!r} = {shown(value)}: must be key=value with a key such as bit.blades or "
-            "string.0.length"
+            f"override {dotted!r} = {shown(value)}: must be key=value with a key such as bit.blades or string.0.length"
         )
     if isinstance(value, str):
         try:
@@ -439,9 +429,7 @@ def _override(data: dict[str, Any], dotted: str, value: Any) -> None:
             if not last:
                 here.setdefault(part, {})
         else:
-            raise SceneError(
-                f"override {dotted} = {shown(value)}: {'.'.join(parts[:i])} = {shown(here)} is no table"
-            )
+            raise SceneError(f"override {dotted} = {shown(value)}: {'.'.join(parts[:i])} = {shown(here)} is no table")
         if last and value is None and isinstance(here, dict):
             here.pop(place, None)
         elif last:

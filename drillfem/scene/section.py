@@ -71,9 +71,7 @@ class Elasticity:
     C33: float = key("stiffness along the rod at held lateral faces", "Pa", POSITIVE)
     C44: float = key("shear modulus of the plane 2-3", "Pa", POSITIVE)
     C55: float = key("shear modulus of the plane 1-3", "Pa", POSITIVE)
-    C66: float | None = key(
-        "shear modulus of the plane 1-2; a rod does not feel it", "Pa", POSITIVE, default=None
-    )
+    C66: float | None = key("shear modulus of the plane 1-2; a rod does not feel it", "Pa", POSITIVE, default=None)
 
     def check(self) -> Iterator[tuple[str, str]]:
         if self.C11 * self.C22 <= self.C12**2:
@@ -179,9 +177,7 @@ class Section:
     material: Material | None = key(
         "material of this section, in the place of [material]", default=None, default_text="[material]"
     )
-    stiffness: Stiffness | None = key(
-        "section stiffness given directly, in the place of a material", default=None
-    )
+    stiffness: Stiffness | None = key("section stiffness given directly, in the place of a material", default=None)
     given_mass: float | None = key(
         "mass per length; only with a direct stiffness",
         "kg/m",

@@ -46,9 +46,7 @@ class Contact:
     friction_static: float = key("coefficient mu_s: the peak of the friction law", "1", NOT_NEGATIVE)
     friction_dynamic: float = key("coefficient mu_d at high speed", "1", NOT_NEGATIVE)
     friction_velocity_scale: float = key("n: the peak lies near the speed 1/n", "s/m", POSITIVE, default=20.0)
-    friction_regularisation: float = key(
-        "epsilon: rounds the law off at zero speed", "1", POSITIVE, default=1e-4
-    )
+    friction_regularisation: float = key("epsilon: rounds the law off at zero speed", "1", POSITIVE, default=1e-4)
     projected: bool = key(
         "friction from the sliding speed along the wall only (false: the whole speed, as printed)",
         default=True,
@@ -63,9 +61,7 @@ class Contact:
 class TopDrive:
     """What turns the string at its top, and what it hangs on."""
 
-    kind: str = key(
-        "how the top is turned", choices=("imposed-speed", "imposed-angle", "none"), default="none"
-    )
+    kind: str = key("how the top is turned", choices=("imposed-speed", "imposed-angle", "none"), default="none")
     speed: float | None = key(
         "speed Omega_0 (of a profile: the speed that it is built around)",
         "rad/s",
@@ -108,8 +104,7 @@ class TopDrive:
         if self.weight_on_bit is not None and self.hook_load is not None:
             yield (
                 "hook_load",
-                f"must be left out where weight_on_bit = {self.weight_on_bit:g} N is given: one follows "
-                "from the other",
+                f"must be left out where weight_on_bit = {self.weight_on_bit:g} N is given: one follows from the other",
             )
 
     def motion(self, t: float) -> tuple[float, float, float]:
@@ -204,9 +199,7 @@ class Rock:
 
     intrinsic_specific_energy: float = key("epsilon_1: energy to cut a volume", "Pa", POSITIVE)
     contact_strength: float = key("sigma_1: pressure under the wear flats of a turning bit", "Pa", POSITIVE)
-    contact_strength_stalled: float = key(
-        "sigma_2: pressure under the wear flats of a stalled bit", "Pa", POSITIVE
-    )
+    contact_strength_stalled: float = key("sigma_2: pressure under the wear flats of a stalled bit", "Pa", POSITIVE)
     surface: Surface = key("numerics of the rock surface", default=Surface())
 
 
@@ -260,19 +253,13 @@ class Ends:
         default="bit",
     )
     top_mass: float = key("mass lumped at the top", "kg", NOT_NEGATIVE, default=0.0)
-    top_inertia: float = key(
-        "rotary inertia about the axis lumped at the top", "kg m^2", NOT_NEGATIVE, default=0.0
-    )
+    top_inertia: float = key("rotary inertia about the axis lumped at the top", "kg m^2", NOT_NEGATIVE, default=0.0)
     bottom_mass: float = key("mass lumped at the bottom", "kg", NOT_NEGATIVE, default=0.0)
     bottom_inertia: float = key(
         "rotary inertia about the axis lumped at the bottom", "kg m^2", NOT_NEGATIVE, default=0.0
     )
-    tip_force: Vector = key(
-        "dead force at the bottom end, fixed frame", "N", count=3, default=(0.0, 0.0, 0.0)
-    )
-    tip_moment: Vector = key(
-        "dead moment at the bottom end, fixed frame", "N m", count=3, default=(0.0, 0.0, 0.0)
-    )
+    tip_force: Vector = key("dead force at the bottom end, fixed frame", "N", count=3, default=(0.0, 0.0, 0.0))
+    tip_moment: Vector = key("dead moment at the bottom end, fixed frame", "N m", count=3, default=(0.0, 0.0, 0.0))
 
 
 @dataclass(frozen=True)
@@ -280,9 +267,7 @@ class Reference:
     """Shape of the string when it carries nothing; it starts at the origin along e3."""
 
     shape: str = key("shape of the unstressed string", choices=("straight", "arc"), default="straight")
-    radius: float | None = key(
-        "radius of the arc", "m", POSITIVE, default=None, default_text="required for an arc"
-    )
+    radius: float | None = key("radius of the arc", "m", POSITIVE, default=None, default_text="required for an arc")
     bend_towards: Vector = key("unit vector across e3 towards which the arc bends", "1", count=3, default=E1)
 
     def check(self) -> Iterator[tuple[str, str]]:
@@ -312,9 +297,7 @@ class Mesh:
 
     elements: int = key("elements of the whole string", bound=between(1, 100_000), default=64)
     degree: int = key("polynomial degree of the fields", bound=between(1, 4), default=3)
-    grading: float = key(
-        "length of the last over the first element of the last section", "1", POSITIVE, default=1.0
-    )
+    grading: float = key("length of the last over the first element of the last section", "1", POSITIVE, default=1.0)
     quadrature: str = key(
         "'reduced' keeps slender elements from locking", choices=("reduced", "full"), default="reduced"
     )
@@ -347,9 +330,7 @@ class Time:
     rho_infinity: float = key(
         "generalized-alpha: what is left per step of infinitely fast waves", "1", between(0, 1), default=0.9
     )
-    theta: float = key(
-        "theta: 0.5 is the trapezoidal rule, 1 is backward Euler", "1", between(0.5, 1), default=0.5
-    )
+    theta: float = key("theta: 0.5 is the trapezoidal rule, 1 is backward Euler", "1", between(0.5, 1), default=0.5)
     adaptive: bool = key("let the error estimate choose the step", default=False)
     tolerance: float = key(
         "relative error per adaptive step", "1", Bound("> 0 and < 1", lambda x: 0 < x < 1), default=1e-6
@@ -380,9 +361,7 @@ class Time:
 class Output:
     """What is written, and how often."""
 
-    interval: float = key(
-        "time between two rows of the history", "s", POSITIVE, default=0.0, default_text="time.step"
-    )
+    interval: float = key("time between two rows of the history", "s", POSITIVE, default=0.0, default_text="time.step")
     fields_interval: float = key(
         "time between two pictures of the whole string",
         "s",

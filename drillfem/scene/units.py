@@ -46,9 +46,7 @@ def to_si(text: str, unit: str) -> float:
     registry = _registry()
     try:
         given = registry.parse_units(_POWER.sub(r"**\1", unit_text))
-        value = (
-            registry.Quantity(number, given).to(registry.parse_units(unit if unit != "1" else "")).magnitude
-        )
+        value = registry.Quantity(number, given).to(registry.parse_units(unit if unit != "1" else "")).magnitude
     except Exception as error:  # pint, its tokenizer and Python's arithmetic each raise their own kinds here
         if "not defined" in str(error):
             raise ValueError(f"has an unknown unit {unit_text!r}") from None

@@ -47,7 +47,7 @@ class EnergyAudit:
     scale: float = 0.0
 
     def add(self, time: float, powers: dict[str, float]) -> None:
-        """Powers (W) at ``time`` (s): positive put energy in for drive, gravity and hook, take it out for the others."""
+        """Powers (W) at ``time`` (s): of drive, gravity and hook into the string, the others out of it."""
         half = (time - self.time) / 2
         for name, power in powers.items():
             self.works[name] += half * (power + self.powers[name])

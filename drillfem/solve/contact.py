@@ -84,7 +84,7 @@ class RockContact:
         return found[0], found[1]
 
     def commit(self, turn: float, depth: float, step: float, speed0: float, speed1: float, spin: float) -> None:
-        """The bit has turned by ``turn`` (rad) and gone to ``depth`` (m) in a step (s) with these axial speeds (m/s)."""
+        """The bit has turned by ``turn`` (rad) and gone to ``depth`` (m) in a step (s); axial speeds in m/s."""
         if abs(turn) > 1e-12:
             # the path within the step: cubic in the angle, from the speeds at its ends
             rate = step / turn
@@ -101,7 +101,7 @@ class RockContact:
         return self.surface.removed * self.law.radius**2 / 2
 
     def picture(self) -> dict[str, Array]:
-        """Surface behind the blades for pictures: ``rock_angle`` (rad, from a blade backwards) and ``rock_height`` (m)."""
+        """Surface for pictures: ``rock_angle`` (rad, from a blade backwards) and ``rock_height`` (m)."""
         return rock_picture(self.surface)
 
     def save(self) -> dict[str, Any]:

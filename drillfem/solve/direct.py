@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from .contact import RockContact
 from ..compat import Array
 from ..errors import SimulationError
 from ..models.initial import initial_state
 from ..models.rod import Rod
 from ..results import ResultWriter
 from .audit import WORKS, EnergyAudit
+from .contact import RockContact
 from .dynamics import Stepper
 from .newton import turn_between
 from .statics import Statics
@@ -294,9 +294,7 @@ def run_static(scene: Any, writer_of: Callable[..., ResultWriter], progress: Obs
         record(0.0, x0)
         factors = np.arange(1, scene.time.load_steps + 1) / scene.time.load_steps
         done = statics.solve(x0, factors, set_load, record)
-        return writer.finish(
-            {"steps": done.load_steps, "newton_iterations": done.newton_iterations, "converged": True}
-        )
+        return writer.finish({"steps": done.load_steps, "newton_iterations": done.newton_iterations, "converged": True})
 
 
 __all__ = ["DirectRun", "SimulationError", "run_dynamic", "run_static", "variables"]

@@ -149,7 +149,7 @@ class Stepper:
         self._trouble = max(0, self._trouble + after - before - 1)
         if self._trouble > _TROUBLE:
             raise SimulationError(
-                f"time stepping breaks down at t = {now:.6g} s (step down to {now - t:.2g} s, nearly every one refused): "
+                f"time stepping breaks down at t = {now:.6g} s (step {now - t:.2g} s, nearly every one refused): "
                 "try a smaller time.step or another time.integrator"
             )
         return StepReport(now, now - t, self.stage_time)

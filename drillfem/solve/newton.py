@@ -2,13 +2,13 @@
 
 Two ideas make it robust and fast.
 
-**Condensation to the bit.** The wear-flat force climbs over 1e-5 m/s: its slope dwarfs the string's impedance, and plain
-Newton flips between its branches. Here the string is linearised and the rock is not: with the string's compliance at the
-bit (two extra columns of the factorised Jacobian) every iteration ends with the exact solution of the 2x2 bit problem.
+**Condensation to the bit.** The wear-flat force climbs over 1e-5 m/s: its slope dwarfs the string's impedance, and
+plain Newton flips between its branches. Here the string is linearised and the rock is not: with the string's compliance
+at the bit (two extra columns of the factorised Jacobian) every iteration ends with the exact solution of the 2x2 bit problem.
 
 **A Jacobian that turns with the string.** A kept factorisation goes stale as the string spins. For sections with equal
 bending stiffness the system is equivariant under a turn of every section about its own axis, so the kept Jacobian is
-used in the frame that has turned since: P = T J0^-1 T^-1 with T the nodal turn. It is renewed when the contraction slows.
+used in the frame that has turned since: P = T J0^-1 T^-1 with T the nodal turn. It is renewed when contraction slows.
 """
 
 from __future__ import annotations
@@ -135,7 +135,11 @@ class BitCoupledNewton:
             self._bit_number = int(rod.nodes[-1])
             first = self._bit_number * size
             self._bit_node = slice(first, first + size)
-            turn = slice(at.rotation.start - first, at.rotation.stop - first) if isinstance(at.rotation, slice) else at.rotation - first
+            turn = (
+                slice(at.rotation.start - first, at.rotation.stop - first)
+                if isinstance(at.rotation, slice)
+                else at.rotation - first
+            )
             self._bit_at = (turn, at.depth - first, at.speed - first, at.spin - first)
         self._history: list[Array] = []
 

@@ -49,9 +49,7 @@ class Statics:
         n = len(a.x_names)
         self.V = lagrange(rod.mesh, rod.scene.mesh.degree, n)
         self.x = dolfinx.fem.Function(self.V)
-        terms = vw.static_terms(
-            a, self.x, ufl.TestFunction(self.V), rod.s, rod.section, rod.loads, rod.on, rod.literal
-        )
+        terms = vw.static_terms(a, self.x, ufl.TestFunction(self.V), rod.s, rod.section, rod.loads, rod.on, rod.literal)
         F = vw.total({k: v for k, v in terms.items() if k not in ("inertia", "damping", "friction")})
         self.residual = VectorForm(F)
         self.jacobian = MatrixForm(ufl.derivative(F, self.x, ufl.TrialFunction(self.V)))
@@ -73,7 +71,7 @@ class Statics:
         set_load: Callable[[float], None],
         on_step: Callable[[float, Array], None] | None = None,
     ) -> Equilibrium:
-        """Follow the loads from ``x0`` (flat) through ``load_factors``; ``set_load`` puts a factor into the rod's constants.
+        """Follow the loads from ``x0`` (flat) through ``load_factors``; ``set_load`` applies a factor to the rod.
 
         A step that does not converge is halved (down to 1/64). Raises SimulationError if that does not help, with the
         load factor that was reached.
