@@ -3,8 +3,9 @@
 Two ideas make it robust and fast.
 
 **Condensation to the bit.** The wear-flat force climbs over 1e-5 m/s: its slope dwarfs the string's impedance, and
-plain Newton flips between its branches. Here the string is linearised and the rock is not: with the string's compliance
-at the bit (two extra columns of the factorised Jacobian) every iteration ends with the exact solution of the 2x2 bit problem.
+plain Newton flips between its branches. Here the string is linearised, the rock is not: with the string's compliance
+at the bit (two extra columns of the factorised Jacobian) every iteration ends with the exact
+solution of the 2x2 bit problem.
 
 **A Jacobian that turns with the string.** A kept factorisation goes stale as the string spins. For sections with equal
 bending stiffness the system is equivariant under a turn of every section about its own axis, so the kept Jacobian is
