@@ -16,6 +16,7 @@ from ..results import ResultWriter
 from .audit import WORKS, EnergyAudit
 from .contact import RockContact
 from .dynamics import Stepper
+from .interrupt import Interrupts
 from .newton import turn_between
 from .statics import Statics
 
@@ -231,7 +232,7 @@ def run_dynamic(scene: Any, writer_of: Callable[..., ResultWriter], until: float
     start = scene.time.start
     out = scene.output
     try:
-        with writer:
+        with writer, Interrupts() as interrupts:
             t = start
             if writer.restart is not None:
                 t, state = writer.restart
@@ -246,6 +247,7 @@ def run_dynamic(scene: Any, writer_of: Callable[..., ResultWriter], until: float
             next_row, next_picture, next_save = next(rows), next(pictures), next(saves)
             tiny = 1e-9 * max(1.0, abs(until))
             while t < until - tiny:
+                interrupts.check()
                 t = run.step(min(next_row, next_picture, next_save, until))
                 if t >= next_row - tiny or t >= until - tiny:
                     writer.append(t, run.row(t))
