@@ -9,7 +9,7 @@ from typing import Any, Self
 
 
 class Interrupts:
-    """While it is entered, SIGINT (and SIGTERM, where a handler is set) waits for :meth:`check`; a second one does not."""
+    """While entered, SIGINT (and SIGTERM, where a handler is set) waits for :meth:`check`; a second one does not."""
 
     def __init__(self) -> None:
         self._asked = False
