@@ -33,7 +33,7 @@ def main(out: Path, seconds: float = SECONDS) -> Result:
     print("The same on the axial-torsional rung; then with half the step, a finer mesh, and nearby starts.")
     companions = {"axial-torsional": simulate(straight, until=seconds), **certify(straight, seconds)}
     print_summary(result, companions)
-    print("The rod in space is stepped by a second-order rule, the waves of the straight string are exact: most of what")
+    print("The rod in space is stepped by a second-order rule, the straight string has exact waves: most of what")
     print("the first two runs differ by is that. With --set time.step='0.5 ms' it falls to a quarter.")
     store_statistics(result, companions)
     print(f"The result is in {folder}:")
