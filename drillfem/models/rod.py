@@ -360,14 +360,17 @@ class Rod:
         return power
 
     def _near_wall(self) -> bool:
-        """Whether any node comes within half of the clearance."""
-        block = self._u.reshape(-1, self.ansatz.size)
-        offset = [block[:, i] for i, name in enumerate(self.ansatz.x_names) if name in ("r1", "r2")]
-        if not offset:
-            return False
-        hole = self.scene.hole.diameter or 0.0
-        clearance = (hole - max(section.outer_diameter or 0.0 for section in self.scene.string)) / 2
-        return bool(max(np.abs(x).max() for x in offset) > clearance / 4)
+        """Whether any node has left the axis by more than a quarter of the clearance."""
+        offset, limit = self._offset
+        return bool(offset.max(initial=0.0) > limit or offset.min(initial=0.0) < -limit)
+
+    @cached_property
+    def _offset(self) -> tuple[Array, float]:
+        """Offsets of the nodes from the hole's axis (a view of the unknowns), and a quarter of the clearance."""
+        across = [i for i, name in enumerate(self.ansatz.x_names) if name in ("r1", "r2")]
+        view = self._u.reshape(-1, self.ansatz.size)[:, : len(across)]
+        widest = max(section.outer_diameter or 0.0 for section in self.scene.string)
+        return view, ((self.scene.hole.diameter or 0.0) - widest) / 8
 
     @cached_property
     def _kinetic(self) -> ScalarForm:

@@ -314,6 +314,10 @@ class Scene:
             yield "output.interval", f"must be a whole multiple of time.step = {time.step:g} s"
         if output.checkpoint_interval < time.step:
             yield "output.checkpoint_interval", f"must not be shorter than time.step = {time.step:g} s"
+        if self.bit is not None and self.bit.kind == "cutting" and self.top_drive.speed:
+            passage = 2 * math.pi / (self.bit.blades * abs(self.top_drive.speed))
+            if time.step > passage / 8:
+                yield "time.step", f"must be at most {passage / 8:.2g} s, an eighth of the time between two blades"
         if output.interval > time.end - time.start:
             yield "output.interval", f"must not exceed the run of {time.end - time.start:g} s"
         if output.fields_interval < output.interval * (1 - 1e-9):

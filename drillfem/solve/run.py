@@ -14,6 +14,9 @@ from ..scene import Scene
 
 log = logging.getLogger("drillfem")
 
+#: relative error of the energy balance above which a run is not to be trusted
+_SUSPECT = 1e-3
+
 #: progress(t, t_end, simulated per wall second)
 Progress = Callable[[float, float, float], None]
 
@@ -51,10 +54,15 @@ def _run(scene: Scene, out: Path | None, until: float | None, progress: Progress
     if engine == "condensed":
         from .straight import run_condensed
 
-        return run_condensed(scene, writer, end, tell)
-    from .direct import run_dynamic
+        result = run_condensed(scene, writer, end, tell)
+    else:
+        from .direct import run_dynamic
 
-    return run_dynamic(scene, writer, end, tell)
+        result = run_dynamic(scene, writer, end, tell)
+    error = result.summary["energy_balance_error"]
+    if error is not None and error > _SUSPECT:
+        log.warning("energy balance error %.2g: these results are not to be trusted, try a smaller time.step", error)
+    return result
 
 
 def simulate(

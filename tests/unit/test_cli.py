@@ -172,9 +172,7 @@ def test_resume(run: Run, tmp_path: Path) -> None:
         (["render", "OUT", "--time", "now"], "--time 'now'"),
     ],
 )
-def test_bad_input_is_one_line_and_writes_nothing(
-    run: Run, tmp_path: Path, arguments: list[str], message: str
-) -> None:
+def test_bad_input_is_one_line_and_writes_nothing(run: Run, tmp_path: Path, arguments: list[str], message: str) -> None:
     code, out, err = run(*(str(tmp_path / "out") if a == "OUT" else a for a in arguments))
     assert (code, out) == (2, "")
     assert one_line(err).startswith("error: ")
@@ -192,9 +190,7 @@ def test_a_result_is_not_written_over(run: Run, tmp_path: Path) -> None:
 
 
 def failing(error: BaseException, rows: bool = True) -> Callable[..., Result]:
-    def simulate_until_it_fails(
-        scene: Scene, out: Path, progress: object = None, until: float | None = None
-    ) -> Result:
+    def simulate_until_it_fails(scene: Scene, out: Path, progress: object = None, until: float | None = None) -> Result:
         with ResultWriter(out, scene, "axial-torsional", 386, UNITS) as writer:
             if rows:
                 times = np.array([0.0, 0.1])
@@ -315,16 +311,12 @@ def test_light_commands_import_nothing_heavy(arguments: list[str]) -> None:
         assert not heavy & set(sys.modules), heavy & set(sys.modules)
         print("code", code)
     """
-    done = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == f"code {2 if 'run' in arguments else 0}"
 
 
-def test_render_demo_and_warm_up_call_their_rooms(
-    run: Run, patched: Callable[..., None], tmp_path: Path
-) -> None:
+def test_render_demo_and_warm_up_call_their_rooms(run: Run, patched: Callable[..., None], tmp_path: Path) -> None:
     calls: list[object] = []
 
     def render_all(folder: Path, **options: object) -> list[Path]:

@@ -149,9 +149,7 @@ def test_a_killed_run_loses_its_unflushed_tail_only(tmp_path: Path) -> None:
             out.flush()
             print(t, flush=True)
     """
-    process = subprocess.Popen(
-        [sys.executable, "-c", textwrap.dedent(script)], stdout=subprocess.PIPE, text=True
-    )
+    process = subprocess.Popen([sys.executable, "-c", textwrap.dedent(script)], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     shown = [float(process.stdout.readline()) for _ in range(5)][-1]
     time.sleep(0.07)  # somewhere in the middle of something
@@ -174,9 +172,7 @@ def test_a_killed_run_loses_its_unflushed_tail_only(tmp_path: Path) -> None:
         (ZeroDivisionError(), "ZeroDivisionError()"),
     ],
 )
-def test_a_run_that_ends_early_says_why(
-    tmp_path: Path, scene: Scene, error: BaseException, reason: str
-) -> None:
+def test_a_run_that_ends_early_says_why(tmp_path: Path, scene: Scene, error: BaseException, reason: str) -> None:
     with pytest.raises(type(error)), writer(tmp_path, scene) as out:
         out.append_block([0.1, 0.2], block(np.array([0.1, 0.2])))
         out.update(steps=7)

@@ -134,6 +134,12 @@ BROKEN: list[tuple[str, dict[str, Any], list[str]]] = [
     (V, {"time.step": "-1 ms"}, ["time.step = '-1 ms'", "> 0"]),
     (V, {"time.step": "300 s"}, ["time.step = '300 s'", "end - start = 200 s"]),
     (V, {"time.step": "2 ms"}, ["output.interval = '1 ms'", "multiple of time.step = 0.002 s"]),
+    (V, {"time.step": "10 ms", "output.interval": "10 ms"}, ["time.step = '10 ms'", "at most 0.0091 s"]),
+    (V, {"model": "spatial", "time.engine": "condensed"}, ["time.engine = 'condensed'", "default, petsc"]),
+    (V, {"time.engine": "petsc", "time.integrator": "exact"}, ["time.engine = 'petsc'", "default, condensed"]),
+    (V, {"time.engine": "condensed", "time.integrator": "bdf"}, ["time.integrator = 'bdf'", "default, exact"]),
+    (S, {"time.integrator": "exact"}, ["time.integrator = 'exact'", "generalized-alpha"]),
+    (S, {"time.order": 6}, ["time.order = 6", "from 2 to 5"]),
     (V, {"output.interval": "1.5 ms"}, ["output.interval = '1.5 ms'", "multiple of time.step = 0.001 s"]),
     (V, {"output.interval": "300 s"}, ["output.interval = '300 s'", "200 s"]),
     (V, {"output.fields_interval": "0.1 ms"}, ["output.fields_interval = '0.1 ms'", "output.interval"]),
@@ -225,9 +231,7 @@ def test_unreadable_file(tmp_path: Path) -> None:
         load_scene(file)
 
 
-@pytest.mark.parametrize(
-    "name", ["", ".", "vertical-c1", "x\0y", "n" * 5000, "../scenes", "no/such/place.toml"]
-)
+@pytest.mark.parametrize("name", ["", ".", "vertical-c1", "x\0y", "n" * 5000, "../scenes", "no/such/place.toml"])
 def test_unknown_name(name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SceneError) as caught:

@@ -119,9 +119,7 @@ def test_orthotropic_bar_tells_its_directions_apart() -> None:
 
 
 def test_direct_stiffness() -> None:
-    rod = Section(
-        "rod", 10.0, stiffness=Stiffness(2.8e7, 1e7, 1.4e4, 1e4), given_mass=1.2, given_inertia=6e-4
-    )
+    rod = Section("rod", 10.0, stiffness=Stiffness(2.8e7, 1e7, 1.4e4, 1e4), given_mass=1.2, given_inertia=6e-4)
     assert rod.section_stiffness() == (1e7, 1e7, 2.8e7, 1.4e4, 1.4e4, 1e4)
     assert (rod.mass_per_length, rod.rotary_inertia, rod.retardation_time, rod.outer_radius) == (
         1.2,
@@ -137,13 +135,9 @@ def test_a_section_without_material_says_so() -> None:
         Section("bare", 1.0, 0.1).section_stiffness()
 
 
-@pytest.mark.parametrize(
-    ("change", "key"), [({"C12": 20e9}, "C12"), ({"C33": 1e9}, "C33"), ({"C44": 0}, "C44")]
-)
+@pytest.mark.parametrize(("change", "key"), [({"C12": 20e9}, "C12"), ({"C33": 1e9}, "C33"), ({"C44": 0}, "C44")])
 def test_unstable_material_is_refused(change: dict[str, float], key: str) -> None:
-    data = {
-        name: getattr(WOOD, name) for name in ("C11", "C12", "C13", "C22", "C23", "C33", "C44", "C55", "C66")
-    }
+    data = {name: getattr(WOOD, name) for name in ("C11", "C12", "C13", "C22", "C23", "C33", "C44", "C55", "C66")}
     with pytest.raises(SceneError, match=f"material.elasticity.{key}"):
         read(Material, {"density": 1, "elasticity": data | change}, "material")
 
