@@ -42,7 +42,7 @@ class RockContact:
     def __init__(self, law: BitLaw, surface: RockSurface, spin: float) -> None:
         self.law, self.surface = law, surface
         self._par = law.array
-        self.spin, self.depth = spin, 0.0
+        self.spin, self.depth, self._cut = spin, 0.0, 0.0
 
     @classmethod
     def from_scene(cls, scene: Scene) -> RockContact:
@@ -54,6 +54,7 @@ class RockContact:
         """Weight and torque (N, N m) of a bit that moves like this on the present surface."""
         forces = self.law.forces(speed, spin, self.surface.depth_of_cut(depth))
         self.spin, self.depth = spin, depth
+        self._cut = self.surface.depth_of_cut(depth)
         return forces.weight, forces.torque
 
     def respond(
@@ -81,6 +82,7 @@ class RockContact:
             turn_compliance / spin_compliance,
             self.spin,
         )
+        self._cut = found[10]
         return found[0], found[1]
 
     def commit(self, turn: float, depth: float, step: float, speed0: float, speed1: float, spin: float) -> None:
@@ -92,8 +94,8 @@ class RockContact:
         self.depth, self.spin = depth, spin
 
     def depth_of_cut(self) -> float:
-        """Depth of cut (m, sum over the blades), negative off bottom."""
-        return self.surface.depth_of_cut(self.depth)
+        """Depth of cut (m, sum over the blades) that belongs to the last answer, negative off bottom."""
+        return self._cut
 
     @property
     def volume(self) -> float:
