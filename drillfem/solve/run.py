@@ -15,7 +15,7 @@ from ..scene import Scene
 log = logging.getLogger("drillfem")
 
 #: relative error of the energy balance above which a run is not to be trusted
-_SUSPECT = 1e-3
+_SUSPECT = 1e-2
 
 #: progress(t, t_end, simulated per wall second)
 Progress = Callable[[float, float, float], None]
