@@ -12,7 +12,7 @@ from ..compat import Array
 from ..errors import SimulationError
 from ..models.initial import initial_state
 from ..models.rod import Rod
-from ..results import ResultWriter
+from ..results import STANDARD, ResultWriter
 from .audit import WORKS, EnergyAudit
 from .contact import RockContact
 from .dynamics import Stepper
@@ -22,24 +22,10 @@ from .statics import Statics
 
 Observer = Callable[[float], None]
 
-DRILLING = {
-    "bit_angular_speed": "rad/s",
-    "bit_axial_speed": "m/s",
-    "bit_angle": "rad",
-    "bit_depth": "m",
-    "bit_torque": "N m",
-    "bit_weight": "N",
-    "depth_of_cut": "m",
-    "rock_volume": "m^3",
-}
-COMMON = {
-    "top_torque": "N m",
-    "top_angular_speed": "rad/s",
-    "hook_load": "N",
-    "top_power": "W",
-    "kinetic_energy": "J",
-    "strain_energy": "J",
-}
+_OF_THE_BIT = {name: v.units for name, v in STANDARD.items() if name.startswith("bit_") or name == "depth_of_cut"}
+#: History variables of every run, and those that rock adds: name to unit.
+COMMON = {name: v.units for name, v in STANDARD.items() if name not in _OF_THE_BIT}
+DRILLING = _OF_THE_BIT | {"rock_volume": "m^3"}
 TIP = {"tip_x": "m", "tip_y": "m", "tip_z": "m"}
 
 

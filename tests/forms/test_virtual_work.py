@@ -84,7 +84,7 @@ def spatial(r: Any, axis: int, angle: Any, dr: tuple[Any, ...], dtheta: Any, lit
     return pointwise(ansatz("spatial"), vec(*r, *q), vec(v[0], v[1], v[2], *w), (*dr, *virtual), literal)
 
 
-def agree(one: dict[str, Array], other: dict[str, Array]) -> None:
+def assert_agree(one: dict[str, Array], other: dict[str, Array]) -> None:
     assert set(one) <= set(other)
     for name, value in one.items():
         np.testing.assert_allclose(value, other[name], atol=1e-12, err_msg=name)
@@ -94,14 +94,14 @@ def agree(one: dict[str, Array], other: dict[str, Array]) -> None:
 def test_planar_terms_are_the_spatial_ones() -> None:
     x, test = vec(R1, R3, ANGLE), (S, ufl.cos(S), ufl.exp(S))
     one = pointwise(ansatz("planar"), x, x.dx(1), test)
-    agree(one, spatial((R1, 0, R3), 2, ANGLE, (test[0], 0, test[1]), test[2]))
+    assert_agree(one, spatial((R1, 0, R3), 2, ANGLE, (test[0], 0, test[1]), test[2]))
 
 
 def test_axial_torsional_terms_are_the_spatial_ones() -> None:
     x, test = vec(R3, ANGLE), (ufl.cos(S), ufl.exp(S))
     one = pointwise(ansatz("axial-torsional"), x, x.dx(1), test)
     other = spatial((0, 0, R3), 3, ANGLE, (0, 0, test[0]), test[1])
-    agree({k: v for k, v in one.items() if k in other}, other)
+    assert_agree({k: v for k, v in one.items() if k in other}, other)
     # about e3 the literal law cannot be told from the right one: both give the axial and the torsional work
     literal = spatial((0, 0, R3), 3, ANGLE, (0, 0, test[0]), test[1], literal=True)
     for name in ("internal force", "internal moment"):
