@@ -284,36 +284,24 @@ class Rod:
         self._jacobian(matrix)
         matrix.zeroRows(self._constrained, diag=1.0)
 
-    def load_vector(self, constant: dolfinx.fem.Constant) -> Array:
-        """dF/d(constant) at the present state, shape (dofs,): the direction in which a load enters."""
-        unit = constant.value.copy()
-        other = [(c, c.value.copy()) for c in (self.weight, self.torque)]
-        ones, zeros = np.zeros(self.size), np.zeros(self.size)
-        for c, _ in other:
-            c.value = 0.0
-        self._residual(zeros)
-        constant.value = 1.0
-        self._residual(ones)
-        for c, value in other:
-            c.value = value
-        constant.value = unit
-        ones -= zeros
-        # differences of the internal forces leave round-off everywhere: a load at the bit touches its node only
-        keep = np.zeros(self.size, dtype=bool)
-        first = int(self.nodes[-1]) * self.ansatz.size
-        keep[first : first + self.ansatz.size] = True
-        ones[~keep] = 0.0
-        ones[self._constrained] = 0.0
-        return ones
+    @cached_property
+    def _bit_term(self) -> VectorForm:
+        return VectorForm(self.terms["bit"])
+
+    def bit_load_vectors(self) -> Array:
+        """dF/d(weight) and dF/d(torque) at the present state, shape (2, dofs): the bit's term is linear in its load."""
+        load, vectors = self.bit_load.copy(), np.zeros((2, self.size))
+        for unit, vector in zip(np.eye(2), vectors, strict=True):
+            self.set_bit_load(*unit)
+            self._bit_term(vector)
+        self.set_bit_load(*load)
+        vectors[:, self._constrained] = 0.0
+        return vectors
 
     @property
     def size(self) -> int:
         """Number of scalar unknowns."""
         return len(self.u.x.array)
-
-    def reactions(self) -> dict[int, float]:
-        """Reaction (N or N m) at every constrained dof, from the last residual."""
-        return {int(dof): float(value) for dof, value in zip(self._constrained, self.reaction, strict=True)}
 
     def top_torque(self) -> float:
         """Torque of the drive on the string (N m) at the last residual."""

@@ -52,9 +52,8 @@ class RockContact:
 
     def at_rest(self, speed: float, spin: float, depth: float) -> tuple[float, float]:
         """Weight and torque (N, N m) of a bit that moves like this on the present surface."""
-        forces = self.law.forces(speed, spin, self.surface.depth_of_cut(depth))
-        self.spin, self.depth = spin, depth
-        self._cut = self.surface.depth_of_cut(depth)
+        self.spin, self.depth, self._cut = spin, depth, self.surface.depth_of_cut(depth)
+        forces = self.law.forces(speed, spin, self._cut)
         return forces.weight, forces.torque
 
     def respond(

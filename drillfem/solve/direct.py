@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ..compat import Array
-from ..errors import SimulationError
 from ..models.initial import initial_state
 from ..models.rod import Rod
 from ..results import STANDARD, ResultWriter
@@ -287,6 +286,3 @@ def run_static(scene: Any, writer_of: Callable[..., ResultWriter], progress: Obs
         factors = np.arange(1, scene.time.load_steps + 1) / scene.time.load_steps
         done = statics.solve(x0, factors, set_load, record)
         return writer.finish({"steps": done.load_steps, "newton_iterations": done.newton_iterations, "converged": True})
-
-
-__all__ = ["DirectRun", "SimulationError", "run_dynamic", "run_static", "variables"]

@@ -199,8 +199,8 @@ class BitCoupledNewton:
             self._reference[:] = self._quaternions()
             self._cosine[:], self._sine[:] = 1.0, 0.0
         if self.bit is not None:
-            for column, load in zip(self._columns, (rod.weight, rod.torque), strict=True):
-                column[:] = self._solve_kept(rod.load_vector(load))
+            for column, load in zip(self._columns, rod.bit_load_vectors(), strict=True):
+                column[:] = self._solve_kept(load)
             # a turn of the sections about their axis leaves these four numbers as they are
             depth, speed, _, _ = self._motion(self._columns[0][self._bit_node])
             _, _, turn, spin = self._motion(self._columns[1][self._bit_node])

@@ -117,7 +117,7 @@ def run_condensed(
     saves = max(1, round(scene.output.checkpoint_interval / step))
 
     def report() -> dict[str, Any]:
-        return {"steps": string.count, "energy_balance_error": run.energy_error, **string.counters}
+        return {"energy_balance_error": run.energy_error, **string.counters}
 
     with writer:
         if writer.restart is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from bitlab import C1
 
 from drillfem.bitrock import BitLaw, RockSurface
 from drillfem.solve.condensed import Channel, CondensedString, energy_imbalance
@@ -45,16 +46,7 @@ def c1_string(
     mass, stiff, _, _ = lagrange_matrices(77e9 * polar, RHO * polar, cells)
     _, damp, _, _ = lagrange_matrices(77e9 * polar * times, RHO * polar, cells)
     torsion = Channel(mass, damp, stiff, len(s) - 1, 0)
-    bit = BitLaw(
-        specific_energy=0.252e9,
-        contact_strength=0.252e9,
-        contact_strength_stalled=0.504e9,
-        radius=0.108,
-        wear_flat_length=1.2e-3,
-        inclination=0.38,
-        friction=0.8,
-        blades=6,
-    )
+    bit = BitLaw(**C1)
     cut = bit.depth_of_cut(WEIGHT_ON_BIT)
     rock = RockSurface(scheme, 6, incline=-cut / (2 * np.pi))
     hook = float(axial.load.sum() - WEIGHT_ON_BIT)

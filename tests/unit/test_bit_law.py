@@ -11,20 +11,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bitlab import C1
 
 import drillfem.bitrock
 from drillfem.bitrock import BitLaw
-
-C1 = {
-    "specific_energy": 0.252e9,
-    "contact_strength": 0.252e9,
-    "contact_strength_stalled": 0.504e9,
-    "radius": 0.108,
-    "wear_flat_length": 1.2e-3,
-    "inclination": 0.38,
-    "friction": 0.8,
-    "blades": 6,
-}
 
 
 def test_nominal_values_of_the_thesis():

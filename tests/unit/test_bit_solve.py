@@ -4,21 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from bitlab import C1
 from numba import njit
 
 from drillfem.bitrock import BitLaw, RockSurface, bit_step, solve_bit
 from drillfem.bitrock.law import law_forces
 
-C1 = {
-    "specific_energy": 0.252e9,
-    "contact_strength": 0.252e9,
-    "contact_strength_stalled": 0.504e9,
-    "radius": 0.108,
-    "wear_flat_length": 1.2e-3,
-    "inclination": 0.38,
-    "friction": 0.8,
-    "blades": 6,
-}
 LAW = BitLaw(**C1)
 ONE = np.array([6.0])
 FLAT = 32659.2
