@@ -136,6 +136,14 @@ def bit_load(x: Configuration, virtual: Twist, tangent: Expr, weight: Expr, torq
 
 
 @dataclass(frozen=True)
+class Lump:
+    """Inertia taken from the rod and put at its lower end (5.5.4): ``share`` of what gravity pulls is left."""
+
+    share: Expr
+    attached: EndLoad
+
+
+@dataclass(frozen=True)
 class Loads:
     """What acts on the rod besides itself. ``bit`` = (tangent, weight, torque); absent parts are None."""
 
@@ -145,6 +153,7 @@ class Loads:
     bottom: EndLoad
     bit: tuple[Expr, Expr, Expr] | None = None
     wall: Wall | None = None
+    lump: Lump | None = None
 
 
 def virtual_work(
@@ -164,17 +173,20 @@ def virtual_work(
     dv, du = strain_rates(x, virtual)
     n, m = elastic_resultants(x, section, loads.u0, literal)
     n_v, m_v = viscous_resultants(x, twist, section)
+    weighed = section["mass"] / loads.lump.share if loads.lump else section["mass"]
     terms: Terms = {
         "inertia": inertia(twist, rate, virtual, section) * on.mass,
         "internal force": ufl.dot(n, dv) * on.internal,
         "internal moment": ufl.dot(m, du) * on.internal,
         "damping": (ufl.dot(n_v, dv) + ufl.dot(m_v, du)) * on.internal,
-        "gravity": -section["mass"] * ufl.dot(loads.g, virtual.v) * on.mass
+        "gravity": -weighed * ufl.dot(loads.g, virtual.v) * on.mass
         - loads.top.mass * ufl.dot(loads.g, virtual.v) * on.top
         - loads.bottom.mass * ufl.dot(loads.g, virtual.v) * on.bottom,
         "top drive": end_load(x, twist, rate, virtual, loads.top) * on.top,
         "tip load": end_load(x, twist, rate, virtual, loads.bottom) * on.bottom,
     }
+    if loads.lump is not None:
+        terms["lumped inertia"] = end_load(x, twist, rate, virtual, loads.lump.attached) * on.bottom
     if loads.wall is not None:
         terms["contact"] = contact(x, virtual, section, loads.wall) * on.wall
         terms["friction"] = friction(x, twist, virtual, section, loads.wall) * on.wall
@@ -242,7 +254,8 @@ def kinetic_energy(a: Ansatz, u: Expr, s: Expr, section: Section, loads: Loads, 
         return (load.mass * ufl.dot(t.v, t.v) + ufl.dot(t.w, load.Theta * t.w)) / 2
 
     density = section["mass"] * ufl.dot(t.v, t.v) + ufl.dot(t.w, section.Theta * t.w)
-    return density / 2 * on.mass + at_end(loads.top) * on.top + at_end(loads.bottom) * on.bottom
+    energy = density / 2 * on.mass + at_end(loads.top) * on.top + at_end(loads.bottom) * on.bottom
+    return energy + at_end(loads.lump.attached) * on.bottom if loads.lump else energy
 
 
 def strain_energy(a: Ansatz, x: Expr, s: Expr, section: Section, loads: Loads, on: Measures) -> ufl.Form:

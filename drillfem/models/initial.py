@@ -6,40 +6,8 @@ import numpy as np
 
 from ..compat import Array
 from ..forms.ansatz import Spatial
-from ..forms.constitutive import SECTION
-from ..scene import Scene
-from .rod import Rod, section_table
-
-
-def stretch_and_twist(scene: Scene, s: Array) -> tuple[Array, Array]:
-    """Displacement f(s) (m) and twist psi(s) (rad) of the nominal steady state, from the top down.
-
-    f' = N/EA with N(s) = H_0 - weight above s (6-2), psi' = -T_0/GJ: exact for any number of uniform sections.
-    """
-    nominal = scene.nominal()
-    table = section_table(scene)
-    axial, torsion, mass = (table[:, SECTION.index(k)] for k in ("axial", "torsion", "mass"))
-    f, psi = np.zeros_like(s), np.zeros_like(s)
-    start, tension, f0, psi0 = 0.0, nominal.hook_load, 0.0, 0.0
-    for i, section in enumerate(scene.string):
-        end = start + section.length
-        inside = np.clip(s - start, 0.0, section.length)
-        here = (s >= start) if start > 0 else np.ones(len(s), dtype=bool)
-        weight = mass[i] * scene.gravity.magnitude
-        f[here] = f0 + (tension * inside[here] - weight * inside[here] ** 2 / 2) / axial[i]
-        psi[here] = psi0 - nominal.torque_on_bit * inside[here] / torsion[i]
-        f0 += (tension * section.length - weight * section.length**2 / 2) / axial[i]
-        psi0 -= nominal.torque_on_bit * section.length / torsion[i]
-        tension -= weight * section.length
-        start = end
-    return f, psi
-
-
-def spin_perturbation(scene: Scene) -> float:
-    """Extra spin of the bit at the start (rad/s); ``initial.seed_perturbation`` draws a nearby start."""
-    initial = scene.initial
-    nearby = 1.0 + initial.seed_perturbation * np.random.default_rng(initial.seed).standard_normal()
-    return float(initial.spin_perturbation * (scene.top_drive.speed or 0.0) * nearby)
+from .rod import Rod
+from .steady import spin_perturbation, stretch_and_twist
 
 
 def initial_state(rod: Rod) -> Array:

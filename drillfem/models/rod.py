@@ -28,6 +28,7 @@ from ..forms.ansatz import Ansatz, Spatial, ansatz
 from ..forms.constitutive import SECTION, Section, elastic_resultants, viscous_resultants
 from ..meshes.string import BOTTOM, TOP, StringMesh, string_mesh
 from ..scene import Scene
+from ..scene.nominal import lumped_at_bit
 
 #: Velocity components that an end condition holds; the spin of a driven top is imposed by the drive instead.
 _HELD = {
@@ -43,6 +44,8 @@ _HELD = {
 def section_table(scene: Scene) -> Array:
     """Properties of every section, shape (sections, len(SECTION)), SI."""
     rows = []
+    share = scene.inertia.distributed
+    of_mass = share if scene.resolved_model().name != "torsional" else 1.0
     for section in scene.string:
         k = section.section_stiffness()
         rows.append(
@@ -53,9 +56,9 @@ def section_table(scene: Scene) -> Array:
                 k.bending1,
                 k.bending2,
                 k.torsion,
-                section.mass_per_length,
-                section.rotary_inertia,
-                section.rotary_inertia,
+                section.mass_per_length * of_mass,
+                section.rotary_inertia * share,
+                section.rotary_inertia * share,
                 section.retardation_time,
                 (section.outer_diameter or 0.0) / 2,
             ]
@@ -185,7 +188,16 @@ class Rod:
             bottom=vw.EndLoad(self.tip_force, self.tip_moment, c(ends.bottom_mass), c(ends.bottom_inertia)),
             bit=(c((0.0, 0.0, 1.0)), self.weight, self.torque) if self.has_bit else None,
             wall=wall,
+            lump=self._lump(),
         )
+
+    def _lump(self) -> vw.Lump | None:
+        alpha, c = self.scene.inertia.distributed, self.constant
+        if alpha == 1.0:
+            return None
+        mass, inertia = lumped_at_bit(self.scene)
+        at_bit = vw.EndLoad(c((0.0, 0.0, 0.0)), c((0.0, 0.0, 0.0)), c(mass), c(inertia))
+        return vw.Lump(c(alpha), at_bit)
 
     @property
     def has_bit(self) -> bool:

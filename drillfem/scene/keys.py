@@ -83,6 +83,8 @@ class Slot:
             item = typing.get_args(self.type)[0]
             if dataclasses.is_dataclass(item):
                 return "one or more tables"
+            if item is str:
+                return "a list of any of " + ", ".join(k.choices)
             many = "numbers" if k.count is None else f"{k.count} numbers"
             return f"a list of {many}{limit}" + ("" if k.unit == "1" else f" in {k.unit}")
         return "a table with " + ", ".join(slots(self.type))

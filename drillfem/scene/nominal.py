@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from drillfem.scene.scene import Scene
@@ -37,12 +37,45 @@ def nominal(scene: Scene) -> Nominal:
     return Nominal(depth, depth * (drive.speed or 0.0) / (2 * math.pi), torque, weight - load, load)
 
 
+class Lumps(NamedTuple):
+    """The lumped model of a string; SI units."""
+
+    stiffness: float  # C in N m/rad: polar, 938.1 for the thesis' string (its table prints half)
+    inertia: float  # I in kg m2
+    mass: float  # M in kg: the collars
+    retardation: float  # Kelvin-Voigt time of the spring in s
+
+
+def lumps(scene: Scene) -> Lumps:
+    """Lumped model (5-39): the pipes are the spring, the last section (collars) and a third of the pipes' rotary
+    inertia the mass, besides what the scene lumps at the bottom."""
+    *pipes, collars = scene.string
+    alone = not pipes
+    pipes = pipes or [collars]  # a string of one section is its own spring
+    compliances = [s.length / s.section_stiffness().torsion for s in pipes]
+    inertia = scene.ends.bottom_inertia + math.fsum(2 * s.rotary_inertia * s.length / 3 for s in pipes)
+    inertia += 0 if alone else 2 * collars.rotary_inertia * collars.length
+    late = math.fsum(c * s.retardation_time for c, s in zip(compliances, pipes, strict=True))
+    return Lumps(
+        1 / math.fsum(compliances),
+        inertia,
+        scene.ends.bottom_mass + collars.mass_per_length * collars.length,
+        late / math.fsum(compliances),
+    )
+
+
+def lumped_at_bit(scene: Scene) -> tuple[float, float]:
+    """Mass (kg) and rotary inertia (kg m2) that ``inertia.distributed`` = alpha moves from the string to the bit.
+
+    (1 - alpha) of the lumped model's (5-39), so that alpha -> 0 is that model (5.5.4; spec 9.5).
+    """
+    whole, rest = lumps(scene), 1 - scene.inertia.distributed
+    return rest * (whole.mass - scene.ends.bottom_mass), rest * (whole.inertia - scene.ends.bottom_inertia)
+
+
 @dataclass(frozen=True)
 class Dimensionless:
-    """Two-degree-of-freedom equivalent and its numbers, Appendix C.2.
-
-    The pipes are the spring; the last section (collars) and a third of the pipes' rotary inertia are the
-    mass (5-39)."""
+    """The lumped model (`lumps`) and its numbers, Appendix C.2."""
 
     torsional_stiffness: float  # C in N m/rad: polar, 938.1 for the thesis' string (its table prints half)
     inertia: float  # I in kg m2
@@ -61,13 +94,7 @@ def dimensionless(scene: Scene) -> Dimensionless:
     bit, rock = scene.bit, scene.rock
     if bit is None or rock is None or bit.kind != "cutting":
         raise ValueError("only a cutting bit has the numbers of Appendix C.2")
-    *pipes, collars = scene.string
-    pipes = pipes or [collars]  # a string of one section is its own spring
-    stiffness = 1 / math.fsum(s.length / s.section_stiffness().torsion for s in pipes)
-    alone = len(scene.string) == 1
-    inertia = scene.ends.bottom_inertia + math.fsum(2 * s.rotary_inertia * s.length / 3 for s in pipes)
-    inertia += 0 if alone else 2 * collars.rotary_inertia * collars.length
-    mass = scene.ends.bottom_mass + collars.mass_per_length * collars.length
+    stiffness, inertia, mass, _ = lumps(scene)
     energy, a, zeta = rock.intrinsic_specific_energy, bit.radius, bit.inclination
     t, x = math.sqrt(inertia / stiffness), 2 * stiffness / (energy * a**2)
     return Dimensionless(

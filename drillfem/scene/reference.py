@@ -12,6 +12,7 @@ from typing import Any
 
 from drillfem.scene.keys import Slot, slots
 from drillfem.scene.scene import Scene
+from drillfem.scene.tables import Numbers
 
 _HEAD = """# Scene files: all keys
 
@@ -86,6 +87,7 @@ def reference() -> str:
                 inside = f"{path.strip('[]')}.{name}" if path else name
                 nested.append((f"[[{inside}]]" if typing.get_origin(slot.type) is tuple else f"[{inside}]", inner))
         queue = nested + queue
+    lines += _section("## `[dimensionless]`", Numbers)
     return "\n".join(lines) + "\n"
 
 

@@ -8,11 +8,14 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from drillfem.errors import SceneError
+from drillfem.scene import ladder
 from drillfem.scene.keys import complaint, guess, key, read, shown, write
+from drillfem.scene.ladder import MODELS, ModelChoice
 from drillfem.scene.nominal import Nominal, nominal
+from drillfem.scene.numbers import expanded
 from drillfem.scene.section import Material, Section
 from drillfem.scene.tables import (
     E3,
@@ -21,6 +24,7 @@ from drillfem.scene.tables import (
     Ends,
     Gravity,
     Hole,
+    Inertia,
     Initial,
     Mesh,
     Output,
@@ -30,14 +34,12 @@ from drillfem.scene.tables import (
     TopDrive,
 )
 
-MODELS = ("torsional", "axial-torsional", "planar", "spatial")  # from the poorest to the richest
-
-
-class ModelChoice(NamedTuple):
-    """The model that a scene runs with, and why."""
-
-    name: str
-    reason: str
+#: Engines, and the integrators of each.
+ENGINES = {
+    "petsc": ("generalized-alpha", "theta", "bdf", "arkimex"),
+    "condensed": ("exact", "trapezoidal", "explicit"),
+    "characteristics": ("exact",),
+}
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,7 @@ class Scene:
     rock: Rock | None = key("the rock; needed by a cutting bit", default=None, default_text="none")
     initial: Initial = key("the state at the start", default=Initial())
     ends: Ends = key("how the string is held and loaded at its ends", default=Ends())
+    inertia: Inertia = key("where the string's inertia sits", default=Inertia())
     reference: Reference = key("shape of the unstressed string", default=Reference())
     gravity: Gravity = key("gravity", default=Gravity())
     mesh: Mesh = key("finite elements along the string", default=Mesh())
@@ -75,6 +78,7 @@ class Scene:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Scene:
         """Scene from nested plain data: parsed TOML, or what `to_dict` gave. Raises SceneError."""
+        data = expanded(data)
         scene = read(cls, {"time": {}, **data})._completed()  # an absent [time] lacks its end, and shall say so
         for path, message in scene.problems():
             raise complaint(data, path, message)
@@ -137,59 +141,12 @@ class Scene:
 
     def obstacle(self, model: str) -> str:
         """Why `model` cannot represent this scene; empty if it can."""
-
-        def across(v: tuple[float, ...]) -> bool:
-            return abs(v[0]) > 1e-12 or abs(v[1]) > 1e-12
-
-        ends, gravity = self.ends, self.gravity.direction if self.gravity.magnitude else (0.0, 0.0, 0.0)
-        turns = self.top_drive.kind != "none"
-        motion = (self.initial.velocity, self.initial.angular_velocity)
-        if model in ("torsional", "axial-torsional"):
-            if self.reference.shape != "straight":
-                return f"the unstressed string is bent (reference.shape = {self.reference.shape!r})"
-            if across(gravity):
-                return "gravity acts across the string"
-            if across(ends.tip_force) or across(ends.tip_moment):
-                return "the load at the tip bends the string"
-            if (turns and across(self.top_drive.axis)) or any(map(across, motion)):
-                return "the motion is not along and about the string's axis"
-            if model == "torsional" and self.bit is not None and self.bit.kind == "cutting":
-                return "a cutting bit moves along the axis"
-            if model == "torsional" and (ends.tip_force[2] or motion[0][2]):
-                return "the string is loaded or moves along its axis"
-        if model == "planar":
-            if self.bit is not None:
-                return "a bit turns about the string's axis, which the plane x-z has no room for"
-            if turns and abs(abs(self.top_drive.axis[1]) - 1) > 1e-9:
-                return "the top drive turns about another axis than e2"
-            if self.reference.shape != "straight" and abs(self.reference.bend_towards[1]) > 1e-12:
-                return "the unstressed string is bent out of the plane x-z"
-            out = (
-                ends.tip_force[1],
-                gravity[1],
-                motion[0][1],
-                ends.tip_moment[0],
-                ends.tip_moment[2],
-                motion[1][0],
-                motion[1][2],
-            )
-            if any(abs(x) > 1e-12 for x in out):
-                return "loads or motions lead out of the plane x-z"
-        return ""
+        return ladder.obstacle(self, model)
 
     def resolved_model(self) -> ModelChoice:
-        """The model to run, and why: the one asked for, or for "auto" the poorest that represents the scene.
-
-        Axial-torsional if nothing bends the string, planar if all stays in the plane x-z, else spatial.
-        """
-        if self.model != "auto":
-            return ModelChoice(self.model, "asked for by the scene")
-        why = {m: self.obstacle(m) for m in MODELS}
-        if not why["axial-torsional"]:
-            return ModelChoice("axial-torsional", "the string is straight and nothing bends it")
-        if not why["planar"]:
-            return ModelChoice("planar", f"{why['axial-torsional']}, and all stays in the plane x-z")
-        return ModelChoice("spatial", f"{why['axial-torsional']}, and {why['planar']}")
+        """The model to run, and why: the one asked for, or for "auto" the lowest rung that represents the scene and
+        what is wanted of it, by the rules of `drillfem.scene.ladder`."""
+        return ladder.choose(self)
 
     # -- what must fit together ---------------------------------------------------------------------------
     def problems(self) -> Iterator[tuple[str, str]]:
@@ -200,7 +157,10 @@ class Scene:
         yield from self._numerics_problems()
         if self.model != "auto" and (why := self.obstacle(self.model)):
             able = [m for m in MODELS if not self.obstacle(m)]
-            yield "model", f"must be one of {', '.join(able)}, auto for this scene: {why}"
+            if able:
+                yield "model", f"must be one of {', '.join(able)}, auto for this scene: {why}"
+        if self.output.wanted and all(map(self.obstacle, MODELS)):
+            yield "output.wanted", f"no model of this scene gives that: {self.obstacle(MODELS[-1])}"
 
     def _string_problems(self) -> Iterator[tuple[str, str]]:
         hole = self.hole.diameter
@@ -251,6 +211,8 @@ class Scene:
 
     def _drilling_problems(self) -> Iterator[tuple[str, str]]:
         drive, bit, rock = self.top_drive, self.bit, self.rock
+        if self.inertia.distributed != 1 and (bit is None or bit.kind != "cutting"):
+            yield "inertia.distributed", "must be 1 where there is no cutting bit to lump inertia at"
         if bit is None:
             if drive.weight_on_bit is not None:
                 yield "top_drive.weight_on_bit", "must be left out where there is no [bit]"
@@ -325,27 +287,53 @@ class Scene:
                 "output.fields_interval",
                 f"must not be shorter than output.interval = {output.interval:g} s",
             )
-        if self.condensable:
-            if time.engine == "condensed" and time.integrator not in ("default", "exact"):
-                yield "time.integrator", "must be one of default, exact where time.engine = 'condensed'"
-            if time.engine == "condensed" and time.adaptive:
-                yield "time.adaptive", "must be false where time.engine = 'condensed', whose steps are equal"
-            if time.engine == "petsc" and time.integrator == "exact":
-                yield "time.engine", "must be one of default, condensed where time.integrator = 'exact'"
-        else:
-            why = f"for model {self.resolved_model().name}: only a straight drilling string is condensed to its bit"
-            if time.engine == "condensed":
-                yield "time.engine", f"must be one of default, petsc {why}"
-            if time.integrator == "exact":
-                yield "time.integrator", f"must be one of default, generalized-alpha, theta, bdf, arkimex {why}"
+        able = self.engines
+        if time.engine not in ("default", *able):
+            yield "time.engine", f"must be one of default, {', '.join(able)} for {self._kind_of_run()}"
+        elif time.integrator not in ("default", *(allowed := self._integrators())):
+            on = self._kind_of_run() if time.engine == "default" else f"time.engine = {time.engine!r}"
+            yield "time.integrator", f"must be one of default, {', '.join(allowed)} for {on}"
+        elif time.adaptive and self.engine != "petsc":
+            yield "time.adaptive", f"must be false where time.engine = {self.engine!r}, whose steps are equal"
         if time.integrator == "arkimex" and not 2 <= time.order <= 5:
             yield "time.order", "must be from 2 to 5 where time.integrator = 'arkimex'"
 
+    # -- which engine runs it ---------------------------------------------------------------------------------
     @property
     def condensable(self) -> bool:
         """Whether the string is linear but for its bit, so that the condensed engine can run it."""
         cutting = self.bit is not None and self.bit.kind == "cutting" and self.time.analysis == "dynamic"
-        return cutting and self.resolved_model().name == "axial-torsional"
+        return cutting and self.resolved_model().name in ("lumped", "torsional", "axial-torsional")
+
+    @property
+    def engines(self) -> tuple[str, ...]:
+        """Engines that can run the scene, the default one first."""
+        if not self.condensable:
+            return ("petsc",)
+        model = self.resolved_model().name
+        if model == "axial-torsional":
+            return ("condensed", "petsc")
+        waves = model == "torsional" and not any(s.retardation_time for s in self.string)
+        return ("condensed", "characteristics") if waves else ("condensed",)
+
+    @property
+    def engine(self) -> str:
+        """The engine that runs the scene: the one asked for, else the first that knows the integrator."""
+        if self.time.engine != "default":
+            return self.time.engine
+        knows = (e for e in self.engines if self.time.integrator in ("default", *ENGINES[e]))
+        return next(knows, self.engines[0])
+
+    def _integrators(self) -> tuple[str, ...]:
+        """Integrators to choose from, besides the default."""
+        engines = self.engines if self.time.engine == "default" else (self.time.engine,)
+        return tuple(dict.fromkeys(name for engine in engines for name in ENGINES[engine]))
+
+    def _kind_of_run(self) -> str:
+        kind = f"model {self.resolved_model().name}"
+        if self.condensable and self.engines == ("condensed",):
+            return kind if self.resolved_model().name == "lumped" else f"{kind} with damping"
+        return kind if self.condensable else f"{kind}: only a straight drilling string is condensed to its bit"
 
 
 # -- files ------------------------------------------------------------------------------------------------

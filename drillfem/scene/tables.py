@@ -17,6 +17,22 @@ Vector = tuple[float, ...]
 E1, E2, E3 = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 UNIT_VECTOR = "must be a unit vector"
 
+#: What `output.wanted` may name, by the lowest rung that gives it.
+GIVES: dict[str, tuple[str, ...]] = {
+    "lumped": (
+        "bit_angular_speed", "bit_axial_speed", "bit_angle", "bit_depth", "bit_torque", "bit_weight", "depth_of_cut",
+        "rate_of_penetration", "top_torque", "top_angular_speed", "top_power", "hook_load",
+    ),
+    "torsional": ("angle", "spin", "torque", "torsional_frequencies"),
+    "axial-torsional": (
+        "axial_speed", "axial_force", "kinetic_energy", "strain_energy", "axial_frequencies", "natural_frequencies",
+    ),
+    "planar": (
+        "bending_moment", "bending_stress", "shear_force", "lateral_displacement", "curvature", "bending_frequencies",
+    ),
+    "spatial": ("side_force", "wall_friction", "whirl"),
+}  # fmt: skip
+
 
 def is_unit(v: Vector) -> bool:
     return abs(math.hypot(*v) - 1) < 1e-6
@@ -181,12 +197,28 @@ class Bit:
 
 
 @dataclass(frozen=True)
+class Numbers:
+    """The numbers of Appendix C.2, (C-1)-(C-7), in the place of string, drive, bit and rock: a lumped model."""
+
+    psi: float = key("system number", "1", POSITIVE)
+    beta: float = key("bit-rock interaction number", "1", NOT_NEGATIVE)
+    lambda_: float = key("bluntness number", "1", NOT_NEGATIVE, name="lambda")
+    omega_0: float = key("speed of the top", "1", POSITIVE)
+    W_0: float = key("weight on bit", "1", POSITIVE)
+    blades: int = key("number of blades", bound=at_least(1), default=6)
+    # the scales of the thesis' string, spec 7.7
+    time: float = key("time scale t*", "s", POSITIVE, default=0.34674)
+    length: float = key("length scale L*", "m", POSITIVE, default=6.3831e-4)
+
+
+@dataclass(frozen=True)
 class Surface:
     """Numerics of the rock surface that the blades cut."""
 
     scheme: str = key(
-        "'dg': advection by discontinuous Galerkin; 'profile': the profile itself moves, exactly",
-        choices=("dg", "profile"),
+        "'dg': advection by discontinuous Galerkin; 'supg': by stabilised linear elements; 'upwind': by first-order "
+        "upwind cells; 'profile': the profile itself moves, exactly",
+        choices=("dg", "supg", "upwind", "profile"),
         default="dg",
     )
     degree: int = key("polynomial degree of dg", bound=between(0, 4), default=2)
@@ -263,6 +295,19 @@ class Ends:
 
 
 @dataclass(frozen=True)
+class Inertia:
+    """Where the string's inertia sits: spread along it, or lumped at the bit as the lumped model has it."""
+
+    distributed: float = key(
+        "alpha: share of the string's own inertia that stays spread along it; the rest of the lumped model's "
+        "inertia (5-39) sits at the bit (5.5.4). The weight is that of the whole string",
+        "1",
+        Bound("> 0 and <= 1", lambda x: 0 < x <= 1),
+        default=1.0,
+    )
+
+
+@dataclass(frozen=True)
 class Reference:
     """Shape of the string when it carries nothing; it starts at the origin along e3."""
 
@@ -324,7 +369,16 @@ class Time:
     integrator: str = key(
         "time integrator",
         default="default",
-        choices=("default", "generalized-alpha", "theta", "bdf", "arkimex", "exact"),
+        choices=(
+            "default",
+            "generalized-alpha",
+            "theta",
+            "bdf",
+            "arkimex",
+            "exact",
+            "trapezoidal",
+            "explicit",
+        ),
     )
     order: int = key("order of bdf and arkimex", bound=between(1, 6), default=2)
     rho_infinity: float = key(
@@ -342,8 +396,9 @@ class Time:
         default="kept",
     )
     engine: str = key(
-        "'petsc' steps the whole system, 'condensed' a straight string reduced to its bit",
-        choices=("default", "petsc", "condensed"),
+        "'petsc' steps the whole system, 'condensed' a straight string reduced to its bit, 'characteristics' an "
+        "undamped torsional one along its waves",
+        choices=("default", "petsc", "condensed", "characteristics"),
         default="default",
     )
 
@@ -370,3 +425,15 @@ class Output:
         default_text="a twentieth of the run",
     )
     checkpoint_interval: float = key("time between two checkpoints", "s", POSITIVE, default=5.0)
+    wanted: tuple[str, ...] | None = key(
+        "what is wanted of the run: the model must give it",
+        choices=[name for names in GIVES.values() for name in names],
+        default=None,
+        default_text="motion and loads of the bit",
+    )
+    tolerance: float = key(
+        "relative error of them that a poorer model may make",
+        "1",
+        Bound("> 0 and < 1", lambda x: 0 < x < 1),
+        default=0.05,
+    )

@@ -1,4 +1,7 @@
-"""Energy balance of a run: what comes in at the top and by gravity is stored, cut, rubbed or damped."""
+"""What a run records, and its energy balance.
+
+What comes in at the top and by gravity is stored, cut, rubbed or damped.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
+
+from ..results import STANDARD
 
 Array = npt.NDArray[np.float64]
 
@@ -18,6 +23,17 @@ WORKS = {
     "dissipated": "work lost to internal damping",
     "work_wall": "work of contact and friction at the wall",
 }
+
+_OF_THE_BIT = {name: v.units for name, v in STANDARD.items() if name.startswith("bit_") or name == "depth_of_cut"}
+#: History variables of every run, and those that rock adds: name to unit.
+COMMON = {name: v.units for name, v in STANDARD.items() if name not in _OF_THE_BIT}
+DRILLING = _OF_THE_BIT | {"rock_volume": "m^3"}
+TIP = {"tip_x": "m", "tip_y": "m", "tip_z": "m"}
+
+
+def variables(drilling: bool) -> dict[str, str]:
+    """History variables of a run, name to unit."""
+    return COMMON | dict.fromkeys(WORKS, "J") | (DRILLING if drilling else TIP)
 
 
 def imbalance(works: dict[str, Array], stored: Array, stored_at_start: float, scale: float) -> tuple[Array, float]:

@@ -16,7 +16,6 @@ At the end of the step the modes answer the bit force by affine maps, and `drill
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,6 +41,7 @@ from drillfem.bitrock.law import (
 )
 from drillfem.bitrock.solve import bit_step
 from drillfem.bitrock.surface import RockSurface, SurfaceData, ahead, commit
+from drillfem.models.straight import Channel
 
 F8 = NDArray[np.float64]
 TopMotion = Callable[[F8], tuple[F8, F8]]
@@ -76,29 +76,6 @@ UNITS = dict(
         strict=True,
     )
 )
-
-
-@dataclass(frozen=True)
-class Channel:
-    """One direction of the string, as assembled: dense symmetric matrices over nodal degrees of freedom.
-
-    mass, damping, stiffness : (n, n).  bit, top : indices of the end degrees of freedom.
-    load : (n,) constant load (gravity), N; None for none.
-    A uniform motion must be a vector of ones with stiffness @ 1 = damping @ 1 = 0 (no foundation).
-    """
-
-    mass: F8
-    damping: F8
-    stiffness: F8
-    bit: int
-    top: int
-    load: F8 | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("damping", "stiffness"):
-            matrix = getattr(self, name)
-            if np.abs(matrix.sum(axis=1)).max() > 1e-8 * max(np.abs(matrix).max(), 1e-300):
-                raise ValueError(f"condensed string: {name} resists a uniform motion")
 
 
 class Modes(NamedTuple):

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ..bitrock.jit import announce
 from ..bitrock.law import BitLaw
 from ..bitrock.solve import bit_step
 from ..bitrock.surface import RockSurface
-from ..compat import Array
-from ..models.rock import advection_operators
 from ..scene import Scene
+
+Array = npt.NDArray[np.float64]
 
 
 def rock_picture(surface: RockSurface, points: int = 97) -> dict[str, Array]:
@@ -27,11 +29,16 @@ def rock_picture(surface: RockSurface, points: int = 97) -> dict[str, Array]:
 
 
 def surface_of(scene: Scene) -> RockSurface:
-    """Rock surface of a scene, in nominal drilling; the operators of scheme dg come from the UFL form."""
+    """Rock surface of a scene, in nominal drilling.
+
+    The operators of scheme dg come from the UFL form where DOLFINx is installed; NumPy's agree with them to round-off.
+    """
     bit, rock = scene.bit, scene.rock
     assert bit is not None and rock is not None
     operators = None
-    if rock.surface.scheme == "dg":
+    if rock.surface.scheme == "dg" and find_spec("dolfinx") is not None and find_spec("petsc4py") is not None:
+        from ..models.rock import advection_operators
+
         operators = advection_operators(rock.surface.degree, rock.surface.elements, 2 * np.pi / bit.blades)
     return RockSurface.from_scene(scene, operators)
 
@@ -46,7 +53,7 @@ class RockContact:
 
     @classmethod
     def from_scene(cls, scene: Scene) -> RockContact:
-        """Rock of a scene, in nominal drilling; DG operators come from the UFL form."""
+        """Rock of a scene, in nominal drilling."""
         announce()
         return cls(BitLaw.from_scene(scene), surface_of(scene), scene.top_drive.speed or 0.0)
 

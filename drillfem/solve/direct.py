@@ -11,8 +11,8 @@ import numpy as np
 from ..compat import Array
 from ..models.initial import initial_state
 from ..models.rod import Rod
-from ..results import STANDARD, ResultWriter
-from .audit import WORKS, EnergyAudit
+from ..results import ResultWriter
+from .audit import COMMON, TIP, WORKS, EnergyAudit, variables
 from .contact import RockContact
 from .dynamics import Stepper
 from .interrupt import Interrupts
@@ -20,17 +20,6 @@ from .newton import turn_between
 from .statics import Statics
 
 Observer = Callable[[float], None]
-
-_OF_THE_BIT = {name: v.units for name, v in STANDARD.items() if name.startswith("bit_") or name == "depth_of_cut"}
-#: History variables of every run, and those that rock adds: name to unit.
-COMMON = {name: v.units for name, v in STANDARD.items() if name not in _OF_THE_BIT}
-DRILLING = _OF_THE_BIT | {"rock_volume": "m^3"}
-TIP = {"tip_x": "m", "tip_y": "m", "tip_z": "m"}
-
-
-def variables(drilling: bool) -> dict[str, str]:
-    """History variables of a run, name to unit."""
-    return COMMON | dict.fromkeys(WORKS, "J") | (DRILLING if drilling else TIP)
 
 
 class DirectRun:

@@ -21,18 +21,11 @@ _SUSPECT = 1e-2
 Progress = Callable[[float, float, float], None]
 
 
-def engine_of(scene: Scene) -> str:
-    """The engine a scene runs on: the straight drilling string is condensed to its bit, all else goes through PETSc."""
-    if scene.time.engine != "default":
-        return scene.time.engine
-    return "condensed" if scene.condensable and scene.time.integrator in ("default", "exact") else "petsc"
-
-
 def _run(scene: Scene, out: Path | None, until: float | None, progress: Progress | None, resume: bool) -> Result:
     end = scene.time.end if until is None else until
     if not end > scene.time.start:
         raise SceneError(f"until = {end:g} s: must be later than the start of the scene, {scene.time.start:g} s")
-    engine = engine_of(scene)
+    engine = scene.engine
     began: list[float] = []
 
     def tell(t: float) -> None:
@@ -51,7 +44,7 @@ def _run(scene: Scene, out: Path | None, until: float | None, progress: Progress
         from .direct import run_static
 
         return run_static(scene, writer, tell)
-    if engine == "condensed":
+    if engine != "petsc":
         from .straight import run_condensed
 
         result = run_condensed(scene, writer, end, tell)

@@ -12,16 +12,12 @@ import numpy as np
 from ..bitrock.jit import announce
 from ..bitrock.law import BitLaw
 from ..bitrock.surface import RockSurface
-from ..compat import Array
-from ..models.initial import initial_state
-from ..models.rod import Rod
-from ..models.straight import matrices
+from ..models.straight import StraightString
 from ..results import Result, ResultWriter
 from ..scene import Scene
-from .audit import WORKS, imbalance
-from .condensed import Channel, CondensedString
+from .audit import WORKS, Array, imbalance, variables
+from .condensed import CondensedString
 from .contact import rock_picture, surface_of
-from .direct import variables
 
 #: The chunk between two looks at the clock (s of wall time, roughly) and its size at the start (steps).
 _CHUNK_SECONDS, _FIRST_CHUNK = 0.25, 200
@@ -32,29 +28,23 @@ class StraightRun:
 
     def __init__(self, scene: Scene) -> None:
         announce()
-        rod = self.rod = Rod(scene)
-        u0 = initial_state(rod)
-        axial, torsional = matrices(rod)
-        last = len(rod.nodes) - 1
-        weight = -rod.gravity_vector().reshape(-1, rod.ansatz.size)[rod.nodes, rod.ansatz.index("v3")]
-        drive = scene.top_drive
+        self.scene, self.line = scene, StraightString(scene)
+        drive, time = scene.top_drive, scene.time
 
         def top(times: Array) -> tuple[Array, Array]:
-            motions = [drive.motion(float(t)) for t in times + scene.time.start]
+            motions = [drive.motion(float(t)) for t in times + time.start]
             return np.array([m[0] for m in motions]), np.array([m[1] for m in motions])
 
         self.string = CondensedString(
-            Channel(axial.mass, axial.damping, axial.stiffness, last, 0, weight),
-            Channel(torsional.mass, torsional.damping, torsional.stiffness, last, 0),
+            self.line.axial,
+            self.line.torsion,
             BitLaw.from_scene(scene),
             surface_of(scene),
-            scene.time.step,
+            time.step,
             hook_load=scene.nominal().hook_load,
             top=(drive.speed or 0.0) if drive.kind == "imposed-speed" else top,
         )
-        block = u0.reshape(-1, rod.ansatz.size)[rod.nodes]
-        z, phi, v, w = (block[:, rod.ansatz.index(name)] for name in ("r3", "phi", "v3", "w3"))
-        self.string.reset(z - rod.arc_length, v, phi, w)
+        self.string.reset(*self.line.start())
         first = self.string.sample()
         # the bit's angle counts from the start, and its twist there is part of the state
         self.angle_start = first["bit_angle"]
@@ -75,24 +65,13 @@ class StraightRun:
         stored = rows["kinetic_energy"] + rows["strain_energy"]
         error, self.scale = imbalance({name: rows[name] for name in WORKS}, stored, self.stored_at_start, self.scale)
         self.energy_error = float(error[-1])
-        return rows["time"] + self.rod.scene.time.start, {name: rows[name] for name in variables(True)}
+        return rows["time"] + self.scene.time.start, {name: rows[name] for name in variables(True)}
 
     energy_error = 0.0
 
     def fields(self) -> dict[str, Array]:
         """Fields along the string now."""
-        rod, now = self.rod, self.string.fields()
-        u = np.zeros((len(rod.nodes), rod.ansatz.size))
-        values = {
-            "r3": rod.arc_length + now["displacement"],
-            "phi": now["angle"],
-            "v3": now["axial_speed"],
-            "w3": now["angular_speed"],
-        }
-        for name, value in values.items():
-            u[rod.nodes, rod.ansatz.index(name)] = value
-        rod.set_state(u.reshape(-1), np.zeros(rod.size))
-        return rod.fields() | rock_picture(self.surface)
+        return self.line.fields(**self.string.fields()) | rock_picture(self.surface)
 
     def save(self) -> dict[str, Any]:
         """State for a checkpoint."""
@@ -109,7 +88,7 @@ def run_condensed(
 ) -> Result:
     """March a scene to ``until``, writing as it goes."""
     run = StraightRun(scene)
-    writer = writer_of(run.rod.model, run.rod.size, variables(True))
+    writer = writer_of(run.line.model, run.line.dofs, variables(True))
     string, start, step = run.string, scene.time.start, scene.time.step
     end = round((until - start) / step)
     every = round(scene.output.interval / step)

@@ -16,7 +16,7 @@ import drillfem
 from drillfem.errors import SceneError, SimulationError
 from drillfem.results import STANDARD, Result, open_result
 from drillfem.scene import Scene, load_scene
-from drillfem.solve.run import certify, engine_of
+from drillfem.solve.run import certify
 
 SUMMARY = (
     "model dofs simulated_seconds wall_seconds steps newton_iterations rejected_steps drilled_depth "
@@ -99,12 +99,12 @@ def assert_contract(folder: Path, drills: bool) -> None:
     ],
 )
 def test_the_straight_drilling_string_is_condensed(overrides: dict[str, Any], engine: str) -> None:
-    assert engine_of(drilling(**overrides)) == engine
+    assert drilling(**overrides).engine == engine
 
 
 def test_strings_without_a_bit_go_through_petsc() -> None:
     for name in ("spin-up", "pendulum", "roll-up"):
-        assert engine_of(load_scene(name)) == "petsc"
+        assert load_scene(name).engine == "petsc"
 
 
 def test_the_condensed_engine_is_refused_where_the_string_is_not_linear() -> None:
@@ -118,7 +118,7 @@ def test_an_interrupted_run_continues_to_the_bit(kind: str, tmp_path: Path) -> N
     scene, calls = scene_of(kind), []
     whole = drillfem.simulate(scene, out=tmp_path / "whole", progress=lambda *x: calls.append(x))
     assert_contract(tmp_path / "whole", drills=True)
-    assert whole.summary["engine"] == engine_of(scene) and whole.summary["steps"] == 300
+    assert whole.summary["engine"] == scene.engine and whole.summary["steps"] == 300
     times, ends, speeds = zip(*calls, strict=True)
     assert np.all(np.diff(times) > 0) and set(ends) == {0.3} and min(speeds) > 0
 

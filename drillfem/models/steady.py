@@ -1,0 +1,39 @@
+"""The nominal drilling state of a straight string, with a perturbed spin (spec 9.2, 9.3). NumPy only."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from ..scene import Scene
+
+Array = npt.NDArray[np.float64]
+
+
+def stretch_and_twist(scene: Scene, s: Array) -> tuple[Array, Array]:
+    """Displacement f(s) (m) and twist psi(s) (rad) of the nominal steady state, from the top down.
+
+    f' = N/EA with N(s) = H_0 - weight above s (6-2), psi' = -T_0/GJ: exact for any number of uniform sections.
+    """
+    nominal = scene.nominal()
+    f, psi = np.zeros_like(s), np.zeros_like(s)
+    start, tension, f0, psi0 = 0.0, nominal.hook_load, 0.0, 0.0
+    for section in scene.string:
+        stiffness, end = section.section_stiffness(), start + section.length
+        inside = np.clip(s - start, 0.0, section.length)
+        here = (s >= start) if start > 0 else np.ones(len(s), dtype=bool)
+        weight = section.mass_per_length * scene.gravity.magnitude
+        f[here] = f0 + (tension * inside[here] - weight * inside[here] ** 2 / 2) / stiffness.axial
+        psi[here] = psi0 - nominal.torque_on_bit * inside[here] / stiffness.torsion
+        f0 += (tension * section.length - weight * section.length**2 / 2) / stiffness.axial
+        psi0 -= nominal.torque_on_bit * section.length / stiffness.torsion
+        tension -= weight * section.length
+        start = end
+    return f, psi
+
+
+def spin_perturbation(scene: Scene) -> float:
+    """Extra spin of the bit at the start (rad/s); ``initial.seed_perturbation`` draws a nearby start."""
+    initial = scene.initial
+    nearby = 1.0 + initial.seed_perturbation * np.random.default_rng(initial.seed).standard_normal()
+    return float(initial.spin_perturbation * (scene.top_drive.speed or 0.0) * nearby)
