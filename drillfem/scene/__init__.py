@@ -1,7 +1,8 @@
 """What is simulated: frozen dataclasses, read from TOML, units at the edge, SI inside."""
 
+from drillfem.scene.ladder import MODELS, ModelChoice
 from drillfem.scene.nominal import Dimensionless, Nominal, describe, dimensionless, torsional_frequency
-from drillfem.scene.scene import MODELS, ModelChoice, Scene, builtin_scenes, load_scene
+from drillfem.scene.scene import Scene, builtin_scenes, load_scene
 from drillfem.scene.section import (
     Elasticity,
     Material,

@@ -168,11 +168,24 @@ def bend_of(hole: Any, length: float) -> Bend | None:
     return found if found.curvature > 1e-12 else None
 
 
+def inclination_of(hole: Any, length: float) -> float:
+    """Greatest inclination (rad) of a hole along a string of ``length`` (m).
+
+    From its ``inclination``, a number or a function of arc length, or its ``stations``; 0 if it has neither.
+    """
+    given = getattr(hole, "inclination", None)
+    if callable(given):
+        return max(abs(float(given(s))) for s in np.linspace(0.0, length, 2001))
+    stations = getattr(hole, "stations", None) or ((0.0, given or 0.0, 0.0),)
+    return float(max(abs(inclination) for _, inclination, _ in stations))
+
+
 def _bend_text(scene: Scene) -> str:
-    bend = bend_of(scene.hole, scene.length)
-    if bend is None:
-        return ""
+    """How the hole leaves the axis e3; empty for a straight one along it."""
+    bend, inclination = bend_of(scene.hole, scene.length), inclination_of(scene.hole, scene.length)
     kind = f"hole.kind = {scene.hole.kind!r}"
+    if bend is None:
+        return f"the hole is inclined by {math.degrees(inclination):.3g} deg ({kind})" if inclination > 1e-12 else ""
     if math.isnan(bend.curvature):
         return f"the hole is bent ({kind})"
     return f"the hole bends by {math.degrees(bend.curvature) * 30:.3g} deg per 30 m ({kind})"
@@ -227,12 +240,13 @@ def hole_rule(scene: Scene, hole: Any = None) -> Finding:
 def side_load_rule(scene: Scene) -> Finding:
     """Gravity, tip loads and motions across the string bend it; a straight rung has no room for them."""
     source = "balance of forces across the string (2-51), (2-61)"
-    g = scene.gravity
+    g, hole = scene.gravity, inclination_of(scene.hole, scene.length)
     numbers: dict[str, float] = {}
     why = []
-    if g.magnitude and across(g.direction):
-        angle = math.degrees(math.atan2(math.hypot(*g.direction[:2]), abs(g.direction[2])))
-        load = max(s.mass_per_length for s in scene.string) * g.magnitude * math.hypot(*g.direction[:2])
+    sine = max(math.hypot(*g.direction[:2]), math.sin(hole))
+    if g.magnitude and (across(g.direction) or sine > 1e-12):
+        angle = math.degrees(max(hole, math.atan2(math.hypot(*g.direction[:2]), abs(g.direction[2]))))
+        load = max(s.mass_per_length for s in scene.string) * g.magnitude * sine
         numbers |= {"inclination": angle, "side_load": load}
         why.append(
             f"gravity is inclined by {angle:.3g} deg to the string, which lies on its wall or sags with up to "
@@ -240,12 +254,8 @@ def side_load_rule(scene: Scene) -> Finding:
         )
         contact, torque = scene.contact, scene.nominal().torque_on_bit
         if contact is not None:
-            weight = (
-                g.magnitude
-                * math.hypot(*g.direction[:2])
-                * math.fsum(s.mass_per_length * s.length * s.outer_radius for s in scene.string)
-            )
-            rub = numbers["friction_torque"] = contact.friction_dynamic * weight
+            arm = math.fsum(s.mass_per_length * s.length * s.outer_radius for s in scene.string)
+            rub = numbers["friction_torque"] = contact.friction_dynamic * g.magnitude * sine * arm
             share = f" ({100 * rub / torque:.2g} % of the bit's)" if torque else ""
             why[-1] += f", friction torque {quantity(rub, 'N m')}{share}"
     force, moment = (math.hypot(*v[:2]) for v in (scene.ends.tip_force, scene.ends.tip_moment))
@@ -302,12 +312,12 @@ def critical_weight(scene: Scene, bit_tilts: bool = False) -> float:
     down = scene.gravity.magnitude * scene.gravity.direction[2]
     lengths, bending, load = [], [], []
     for section in scene.string:
-        k, w = section.section_stiffness().bending1, section.mass_per_length * down
-        scale = (k / abs(w)) ** (1 / 3) if w else section.length
-        n = max(8, min(4000, math.ceil(4 * section.length / scale)))
+        k, per_metre = section.section_stiffness().bending1, section.mass_per_length * down
+        scale = (k / abs(per_metre)) ** (1 / 3) if per_metre else section.length
+        n = max(16, min(4000, math.ceil(4 * section.length / scale)))
         lengths += [section.length / n] * n
         bending += [k] * n
-        load += [w] * n
+        load += [per_metre] * n
     h, stiff, w = np.array(lengths), np.array(bending), np.array(load)
     below = (w * h)[::-1].cumsum()[::-1] - w * h  # weight below the lower end of each element
     n = len(h)
@@ -343,11 +353,11 @@ def critical_weight(scene: Scene, bit_tilts: bool = False) -> float:
 
     # balanced by the elastic diagonal, or the band would mix N/m with N m
     matrices = [banded(e) for e in (elastic, by_weight, by_load)]
-    scale = np.ones(2 * n + 2)
-    scale[free] = matrices[0][0, free] ** -0.5
+    balance = np.ones(2 * n + 2)
+    balance[free] = matrices[0][0, free] ** -0.5
     for m in matrices:
         for i in range(4):
-            m[i, : 2 * n + 2 - i] *= scale[i:] * scale[: 2 * n + 2 - i]
+            m[i, : 2 * n + 2 - i] *= balance[i:] * balance[: 2 * n + 2 - i]
     matrices[0][0, held] = 1.0
 
     def stable(weight: float) -> bool:
@@ -358,7 +368,7 @@ def critical_weight(scene: Scene, bit_tilts: bool = False) -> float:
         return True
 
     euler = stiff.max() * (math.pi / h.sum()) ** 2
-    top = max(euler, float(np.abs(below).max()), 1e-300)
+    top = max(float(euler), float(np.abs(below).max()), 1e-300)
     low, high = -top, top
     while stable(high):
         low, high = high, 4 * high
@@ -410,9 +420,9 @@ def output_rule(scene: Scene) -> Finding:
     """The lowest rung whose results hold what is wanted (`GIVES`)."""
     wanted, source = scene.output.wanted, "what the unknowns of each rung determine"
     if not wanted:
-        needs = "lumped" if drills(scene) else "axial-torsional" if not _plane(scene) else "lumped"
-        text = "not given (output.wanted): motion and loads of the bit" if drills(scene) else "not given: all motion"
-        return Finding("wanted outputs", needs, text, {}, source)
+        if drills(scene):
+            return Finding("wanted outputs", "lumped", "not given: motion and loads of the bit", {}, source)
+        return Finding("wanted outputs", "axial-torsional", "not given: all motion", {}, source)
     givers = {name: giver(name) for name in wanted}
     if not drills(scene):  # nothing couples twist and stretch
         givers = {
@@ -426,10 +436,6 @@ def output_rule(scene: Scene) -> Finding:
     if rank(needs) >= rank("planar") and not _bends(scene):
         text += "; nothing in the scene bends the string, so it is zero unless the string is disturbed"
     return Finding("wanted outputs", needs, text, {}, source, 1.0 if needs != "lumped" else None)
-
-
-def _plane(scene: Scene) -> bool:
-    return bool(obstacle(scene, "axial-torsional"))
 
 
 def _bends(scene: Scene) -> bool:
@@ -528,8 +534,9 @@ def modes_of(waves: Waves, limit: float) -> list[Mode]:
     still = replace(waves, retardation=tuple(0.0 for _ in waves.retardation))
     omega = still.frequencies(2 * math.pi * limit)
     h = 1e-6 * omega
-    above, below = (still.parts(1j * (omega + sign * h))[1] for sign in (1, -1))
-    residue = (2j * omega * still.parts(1j * omega)[0] / ((above - below) / (2j * h))).real
+    s = np.asarray(1j * omega, complex)
+    slope = (still.parts(s + 1j * h)[1] - still.parts(s - 1j * h)[1]) / (2j * h)
+    residue = (2 * s * still.parts(s)[0] / slope).real
     late = float(np.average(waves.retardation, weights=waves.length))
     return [Mode(float(w) / (2 * math.pi), late * float(w) / 2, float(c)) for w, c in zip(omega, residue, strict=True)]
 

@@ -114,30 +114,16 @@ def dimensionless(scene: Scene) -> Dimensionless:
 def torsional_frequency(scene: Scene) -> float:
     """Lowest torsional natural frequency in Hz of the string, top held, bottom free to spin; exact.
 
-    Angle and torque are carried down the sections by their wave solution; the torque left over at the bottom
-    changes sign at the frequency. The thesis' string has 0.453 Hz (its 5.5.4).
+    The thesis' string has 0.453 Hz (its 5.5.4). All of them: `drillfem.scene.frequencies`.
     """
-    data = [(s.length, s.section_stiffness().torsion, 2 * s.rotary_inertia) for s in scene.string]
+    from drillfem.scene.frequencies import End, Uniform, standing_waves
 
-    def left_over(omega: float) -> float:
-        angle, torque = 0.0, 1.0
-        for length, stiffness, inertia in data:
-            k = omega * math.sqrt(inertia / stiffness)
-            c, s = math.cos(k * length), math.sin(k * length)
-            angle, torque = angle * c + torque * s / (stiffness * k), torque * c - angle * s * stiffness * k
-        return torque - omega**2 * scene.ends.bottom_inertia * angle
-
-    travel = math.fsum(length * math.sqrt(inertia / stiffness) for length, stiffness, inertia in data)
-    step = high = 0.02 / travel  # far below any distance between roots, which is about pi / travel
-    while left_over(high) > 0:
-        high += step
-        if high * travel > 10:  # cannot happen for a held top: the first root lies below pi / travel
-            raise ArithmeticError("no torsional natural frequency found")
-    low = high - step
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if left_over(middle) > 0 else (low, middle)
-    return low / (2 * math.pi)
+    pieces = [Uniform(s.length, s.section_stiffness().torsion, 2 * s.rotary_inertia) for s in scene.string]
+    # that of a uniform string needs four times the travel; a stepped one may be faster
+    upto = 0.5 / math.fsum(p.length * math.sqrt(p.inertia / p.stiffness) for p in pieces)
+    while not (found := standing_waves(pieces, End(True), End(False, scene.ends.bottom_inertia), upto)):
+        upto *= 2
+    return found[0]
 
 
 def quantity(value: float, unit: str) -> str:
