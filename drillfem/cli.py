@@ -158,16 +158,20 @@ def render(
     time: Annotated[str | None, typer.Option(metavar="SECONDS", help="Which moment; the last by default.")] = None,
     field: Annotated[str | None, typer.Option(metavar="NAME", help="What colours the string.")] = None,
     film: Annotated[bool, typer.Option("--film", help="Make a film too.")] = False,
+    window: Annotated[
+        list[str] | None, typer.Option(metavar="FROM:TO", help="Times (s) to take spectra from; may be repeated.")
+    ] = None,
 ) -> None:
     """Make pictures of a result."""
     at = _seconds(time, "--time")
+    windows = [_window(text) for text in window or []] or None
     from drillfem.results import is_result, open_result
 
     if not is_result(folder):
         open_result(folder)  # says what is wrong with it
     from drillfem.render import render_all
 
-    for path in render_all(folder, time=at, field=field, film=film):
+    for path in render_all(folder, time=at, field=field, film=film, windows=windows):
         print(path)
 
 
@@ -180,6 +184,101 @@ def demo(
 
     with _keeping(out):
         run_demo(out)
+
+
+@app.command()
+def chart(
+    cases: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[CASE]...", help="waves, lumped, torsional, axial-torsional; all by default."),
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for pictures and numbers.")] = Path("charts"),
+    quick: Annotated[bool, typer.Option("--quick", help="Seconds rather than minutes: fewer points.")] = False,
+) -> None:
+    """Measure speed against accuracy: error over cost of every method."""
+    from drillfem.chart.report import main as draw_charts
+
+    draw_charts(cases or [], out, quick)
+
+
+@app.command()
+def sweep(
+    scene: SceneName,
+    axes: Annotated[list[str], typer.Argument(metavar="KEY=A,B,C...", help="Keys with the values to combine.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the sweep; a part of it is completed.")],
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key in all runs.")
+    ] = None,
+    until: Until = None,
+    jobs: Annotated[int, typer.Option(metavar="N", help="Runs at a time, in processes of their own.")] = 1,
+) -> None:
+    """Simulate a scene with every combination of some values: one table, and the performance of drilling."""
+    from drillfem.sweep import main as run_sweep
+
+    def tell(line: str) -> None:
+        stderr.print(line, markup=False, soft_wrap=True)
+
+    try:
+        run_sweep(scene, axes, out, _overrides(set_), _seconds(until), jobs, tell)
+    except KeyboardInterrupt as error:
+        raise _StoppedError(str(error) or "interrupted", 130) from error
+
+
+@app.command()
+def plan(
+    scene: SceneName,
+    set_: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key.")] = None,
+    outputs: Annotated[
+        str | None, typer.Option(metavar="NAME,...", help="What is wanted: bending_stress, bit_torque ...")
+    ] = None,
+    tolerance: Annotated[str | None, typer.Option(metavar="X", help="Relative error allowed: 0.05 or 5%.")] = None,
+    pilot: Annotated[bool, typer.Option("--pilot/--no-pilot", help="Measure errors and speed by short runs.")] = True,
+    json_: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Say which model a scene needs, why, and what it costs."""
+    from drillfem.plan.report import main as print_plan
+
+    print_plan(scene, _overrides(set_), outputs, tolerance, pilot, json_)
+
+
+@app.command()
+def stability(
+    scene: SceneName,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="New folder for picture and numbers.")],
+    set_: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key.")] = None,
+    speeds: Annotated[
+        str | None, typer.Option(metavar="A..B", help="Speeds of the top: 5..30 (rad/s) or '50..250 rpm'.")
+    ] = None,
+    weights: Annotated[str | None, typer.Option(metavar="A..B", help="Weights on bit: '35..80 kN'.")] = None,
+    runs: Annotated[bool, typer.Option("--runs/--no-runs", help="Confirm the map by short runs.")] = True,
+    surface: Annotated[
+        str, typer.Option(metavar="exact|scene", help="'scene': with the scene's discretised rock surface.")
+    ] = "exact",
+) -> None:
+    """Map the linear stability of steady drilling over top speed and weight on bit."""
+    from drillfem.scene import load_scene
+    from drillfem.stability.command import run as draw_stability
+
+    draw_stability(load_scene(scene, _overrides(set_)), out, speeds, weights, runs, surface)
+
+
+@app.command()
+def reproduce(
+    cases: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[CASE]...", help="V1, V2, C1, C2, C3 (chapter 5), 6-V1, 6-C1; all by default."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="New folder for histories and numbers.")] = None,
+    docs: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the comparison as a page.")] = None,
+    imitate: Annotated[
+        bool, typer.Option("--imitate", help="Compute everything again with numerics like the thesis'.")
+    ] = False,
+    brief: Annotated[bool, typer.Option("--brief", help="Leave out the experiments that explain.")] = False,
+) -> None:
+    """Put the thesis' numbers beside ours, with verdict and reason."""
+    from drillfem.reproduce.command import run as compare
+
+    compare(cases or [], out, docs, imitate, brief, stderr)
 
 
 @app.command("warm-up")
@@ -321,6 +420,14 @@ def _seconds(text: str | None, option: str = "--until") -> float | None:
     except ValueError:
         pass
     raise SceneError(f"{option} {text!r}: must be a time, not negative, such as 20 or '1.5 min'")
+
+
+def _window(text: str) -> tuple[float, float]:
+    """Two times such as ``60:80``, in seconds."""
+    start, colon, end = text.partition(":")
+    if not colon:
+        raise SceneError(f"--window {text!r}: must be FROM:TO in seconds, such as 60:80")
+    return _seconds(start, "--window") or 0.0, _seconds(end, "--window") or 0.0
 
 
 def _clock(seconds: float) -> str:

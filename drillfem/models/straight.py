@@ -76,7 +76,8 @@ class Elements:
         def tabulate(count: int) -> tuple[F8, F8, F8]:
             x, w = np.polynomial.legendre.leggauss(count)
             slopes = [legendre.basis(i).deriv()(x) if i else 0 * x for i in range(degree + 1)]
-            return w, np.polynomial.legendre.legvander(x, degree) @ to_legendre, np.stack(slopes, 1) @ to_legendre
+            value = np.polynomial.legendre.legvander(x, degree) @ to_legendre
+            return w, value, np.stack(slopes, axis=1).astype(np.float64) @ to_legendre
 
         weight, value, _ = tabulate(degree + 1)
         self._mass = value.T @ (weight[:, None] * value) / 2

@@ -6,6 +6,7 @@ neither needs a display.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,11 @@ __all__ = ["render_all", "render_result"]
 
 
 def render_all(
-    folder: str | Path, time: float | None = None, field: str | None = None, film: bool = False
+    folder: str | Path,
+    time: float | None = None,
+    field: str | None = None,
+    film: bool = False,
+    windows: Sequence[tuple[float, float]] | None = None,
 ) -> list[Path]:
     """Make the pictures of the result in ``folder`` and put them into ``folder``/pictures.
 
@@ -24,28 +29,35 @@ def render_all(
         time: which moment to show, s; the saved pose next to it is taken, the last one by default.
         field: scalar field that colours the string; the most telling one by default.
         film: make string.gif as well.
+        windows: times (s) between which spectra are taken; `drillfem.results.windows` by default.
 
     Returns:
         The files written: time-series.png, spectra.png, space-time.png, rock.png (those that apply),
         string.png, string-true.png, and string.gif.
 
     Raises:
-        SceneError: no result there, an unknown field, or a time outside the run.
+        SceneError: no result there, an unknown field, or a time or window outside the run.
         MissingDependency: pyvista is not installed; the charts are made all the same.
     """
     from drillfem.results import open_result
 
-    return render_result(open_result(folder), Path(folder) / "pictures", time, field, film)
+    return render_result(open_result(folder), Path(folder) / "pictures", time, field, film, windows)
 
 
 def render_result(
-    result: Any, pictures: Path, time: float | None = None, field: str | None = None, film: bool = False
+    result: Any,
+    pictures: Path,
+    time: float | None = None,
+    field: str | None = None,
+    film: bool = False,
+    windows: Sequence[tuple[float, float]] | None = None,
 ) -> list[Path]:
     """As `render_all` for a `drillfem.results.Result` in memory; ``pictures`` is made if it is not there."""
     from drillfem.render import charts
     from drillfem.render.story import Story
 
     story = Story(result)
+    charts.looked_at(story, windows)
     if story.fields is None:
         if field is not None or time is not None or film:
             raise SceneError("this result has no saved fields, so there is no string to show or film")
@@ -64,7 +76,7 @@ def render_result(
     made: list[Path | None] = []
     if len(story.history["time"]) > 1:
         made.append(charts.time_series(story, pictures / "time-series.png"))
-        made.append(charts.spectra(story, pictures / "spectra.png"))
+        made.append(charts.spectra(story, pictures / "spectra.png", windows))
     if story.fields is not None:
         made.append(charts.space_time(story, pictures / "space-time.png"))
         made.append(charts.rock(story, index, pictures / "rock.png"))

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from drillfem.errors import SceneError
 from drillfem.render import style
 from drillfem.render.story import Story, attribute
 from drillfem.render.straight import depth_ticks, marks, rpm, subtitle
-from drillfem.results.spectra import Peak, amplitude_spectrum, dominant, evenly
+from drillfem.results.spectra import Peak, Window, dominant_in, spectra_in, windows
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -186,77 +188,129 @@ def shade_stick(axes: Axes, time: np.ndarray, spin: np.ndarray, limit: float, ne
 
 
 # -- spectra ---------------------------------------------------------------------------------------------
-def windows(time: np.ndarray) -> list[tuple[str, float, float]]:
-    """The thesis' S1, S2, S3 for a run of 200 s or more, else the first and the last third."""
-    start, end = float(time[0]), float(time[-1])
-    if start <= 0.5 and end >= 199.9:
-        return [("S1", 0.0, 20.0), ("S2", 90.0, 110.0), ("S3", 180.0, 200.0)]
-    third = (end - start) / 3
-    return [("first third", start, start + third), ("last third", end - third, end)]
+DRILLING: tuple[Row, ...] = (
+    ("bit_angular_speed", "Bit spin", 1.0, "rad/s", style.BLUE),
+    ("bit_axial_speed", "Axial speed of the bit", 1e3, "mm/s", style.GREEN),
+)
+OWN = {"bit_angular_speed": "torsional", "bit_axial_speed": "axial"}  # the vibrations that a channel is about
+KINDS = {"torsional": style.BLUE, "axial": style.GREEN, "bending": style.PURPLE, "coupled": style.INK}
+TOP = 25.0  # Hz that are shown
+DECADES = 3.5  # below the strongest wave
 
 
-def spectra(story: Story, path: Path) -> Path | None:
-    """spectra.png: what frequencies the bit's two speeds have, in windows of time."""
+def spectra(story: Story, path: Path, chosen: Sequence[tuple[float, float]] | None = None) -> Path | None:
+    """spectra.png: what frequencies the bit's two speeds have, in windows of time; None without a bit that cuts.
+
+    Thin: 2|X|/N, the thesis' convention; thick: Hann window, zero padded. Natural frequencies of the string, as the
+    run noted them, stand above; the blade passing frequency is marked. ``chosen``: windows (s) other than the usual.
+    """
     history = story.history
     time = np.asarray(history["time"].values, dtype=float)
-    wanted = [
-        ("bit_angular_speed", "Bit spin", 1.0, "rad/s", style.BLUE),
-        ("bit_axial_speed", "Axial speed of the bit", 1e3, "mm/s", style.GREEN),
-    ]
-    wanted = [row for row in wanted if row[0] in history]
+    wanted = [row for row in DRILLING if row[0] in history]
     if not wanted or len(time) < 64 or story.still:
         return None
-    rows = windows(time)
+    rows = looked_at(story, chosen)
     fastest = 0.5 / float(np.median(np.diff(time)))
-    with style.page(1600, 1200) as figure:
+    top = min(TOP, fastest)
+    height = 150 + 410 * len(rows) + 60
+    with style.page(1600, height) as figure:
         style.heading(figure, f"{story.title}: spectra of the bit's speeds", subtitle_of_history(story, time))
         grid = figure.add_gridspec(
-            len(rows), len(wanted), left=0.065, right=0.985, top=0.885, bottom=0.06, hspace=0.24, wspace=0.14
+            len(rows),
+            len(wanted),
+            left=0.065,
+            right=0.985,
+            top=1 - 165 / height,
+            bottom=66 / height,
+            hspace=0.42,
+            wspace=0.14,
         )
         for column, (name, words, factor, unit, colour) in enumerate(wanted):
-            values = factor * np.asarray(history[name].values, dtype=float)
-            results = []
-            for _, a, b in rows:
-                near = (time >= a - 1e-9) & (time <= b + 1e-9)
-                even, signal = evenly(time[near], values[near])
-                step = float(even[1] - even[0])
-                results.append((*amplitude_spectrum(signal, step), dominant(signal, step, n=6)))
-            for row, ((label, a, b), (frequency, amplitude, waves)) in enumerate(zip(rows, results, strict=True)):
+            for row, window in enumerate(rows):
+                plain, smooth = spectra_in(history, name, window[1:])
+                waves = dominant_in(history, name, window[1:], n=6)
                 axes = figure.add_subplot(grid[row, column])
-                top = float(min(25.0, fastest))
-                shown = frequency <= top
-                f, y = frequency[shown], amplitude[shown]
-                axes.fill_between(f, 0, y, color=colour, alpha=0.22, lw=0)
-                axes.plot(f, y, color=colour, lw=1.3)
-                highest = max([float(y.max()), *(wave.amplitude for wave in waves if wave.frequency < top)])
-                roof = 1.28 * max(highest, 1e-12)
+                strongest = 0.0
+                for (f, a), width, tone, z in ((smooth, 2.4, colour, 2.0), (plain, 0.8, style.INK, 2.1)):
+                    near = (f > 0) & (f <= top)
+                    strongest = max(strongest, factor * float(a[near].max()))
+                    axes.semilogy(f[near], np.maximum(factor * a[near], 1e-300), color=tone, lw=width, zorder=z)
+                strongest = max(strongest, 1e-12)
                 axes.set_xlim(0, top)
-                axes.set_ylim(0, roof)
-                name_peaks(axes, waves, top)
-                axes.set_title(f"{words}, {label}: {a:.4g} to {b:.4g} s")
+                axes.set_ylim(strongest * 10**-DECADES, 12 * strongest)
+                natural_marks(axes, story, OWN[name])
+                passing_mark(axes, story, row == 0 and column == 0)
+                name_peaks(axes, [Peak(f, factor * a) for f, a in waves], top)
+                label = f"{window.label}: " if window.label else ""
+                axes.set_title(f"{words}, {label}{window.start:.4g} to {window.end:.4g} s", pad=34)
                 axes.set_ylabel(f"amplitude ({unit})")
                 if row == len(rows) - 1:
                     axes.set_xlabel("frequency (Hz)")
-        figure.text(
-            0.985,
-            1 - 62 / 1200,
-            "Curve: 2|X|/N without window. Dots: waves found with a Hann window, frequency and amplitude.",
-            ha="right",
-            fontsize=10.5,
-            color=style.GREY,
-        )
+        said = "Thick: Hann window, zero padded. Thin: 2|X|/N without window. Dots: waves, frequency and amplitude."
+        if story.natural_frequencies:
+            said += " Above: natural frequencies."
+        figure.text(0.985, 1 - 62 / height, said, ha="right", fontsize=10.5, color=style.GREY)
         return style.save(figure, path)
+
+
+def looked_at(story: Story, chosen: Sequence[tuple[float, float]] | None) -> list[Window]:
+    """The ``chosen`` windows (s), or the usual ones of the run. Raises SceneError for one that leaves the run."""
+    start, end = (float(story.history["time"].values[i]) for i in (0, -1))
+    for a, b in chosen or ():
+        if not start - 1e-9 <= a < b <= end + 1e-9:
+            raise SceneError(f"window {a:g}:{b:g}: must be FROM:TO in s within the run, from {start:g} s to {end:g} s")
+    return [Window("", *window) for window in chosen] if chosen else windows(start, end)
+
+
+def natural_marks(axes: Axes, story: Story, own: str) -> None:
+    """Ticks above the axes at the string's natural frequencies, numbered; lines through it for the channel's own."""
+    top = axes.get_xlim()[1]
+    across = axes.get_xaxis_transform()
+    level = 0
+    for kind, colour in KINDS.items():
+        found = [f for f in story.natural_frequencies.get(kind, []) if f <= top]
+        if not found:
+            continue
+        low = 1.01 + 0.058 * level
+        level += 1
+        axes.text(-0.008, low, kind, fontsize=8.5, color=colour, transform=axes.transAxes, ha="right", va="bottom")
+        for number, f in enumerate(found, start=1):
+            axes.plot([f, f], [low, low + 0.022], color=colour, lw=1.6, transform=across, clip_on=False)
+            at: dict[str, Any] = {"transform": across, "ha": "left", "va": "bottom"}
+            axes.text(f + 0.004 * top, low, str(number), fontsize=7.5, color=colour, **at)
+            if kind == own:
+                axes.axvline(f, color=colour, lw=0.7, alpha=0.35, zorder=1)
+
+
+def passing_mark(axes: Axes, story: Story, words: bool) -> None:
+    """A dashed line where the blades pass, at the drive's speed."""
+    f = story.blade_passing
+    if f is None or f > axes.get_xlim()[1]:
+        return
+    axes.axvline(f, color=style.VERMILION, lw=1.1, ls=(0, (5, 3)), zorder=1.5)
+    if words:
+        axes.annotate(
+            f"blades pass\n{f:.2f} Hz",
+            (f, 1.0),
+            xycoords=axes.get_xaxis_transform(),
+            xytext=(5, -4),
+            textcoords="offset points",
+            fontsize=9.5,
+            color=style.VERMILION,
+            va="top",
+            bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 0.5},
+        )
 
 
 def name_peaks(axes: Axes, waves: list[Peak], top: float) -> None:
     """Marks and labels at the dominant waves; a label that would cover a stronger wave's is left out."""
     taken: list[tuple[float, float]] = []
-    roof = axes.get_ylim()[1]
+    low, high = np.log(axes.get_ylim())
     for x, y in waves:
         if x > top:
             continue
         axes.plot([x], [y], "o", ms=4.5, color=style.VERMILION, zorder=5)
-        if any(abs(x - u) < 0.095 * top and abs(y - v) < 0.21 * roof for u, v in taken):
+        if any(abs(x - u) < 0.095 * top and abs(np.log(y / v)) < 0.15 * (high - low) for u, v in taken):
             continue
         taken.append((x, y))
         right = x > 0.9 * top
@@ -269,6 +323,8 @@ def name_peaks(axes: Axes, waves: list[Peak], top: float) -> None:
             va="bottom",
             ha="right" if right else "left",
             linespacing=1.05,
+            bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 0.5},
+            zorder=4,
         )
 
 

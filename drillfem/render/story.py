@@ -88,6 +88,9 @@ class Story:
         )
         self.model = str(attribute(getattr(result, "summary", None), "model", default="") or "")
         self.nominal = self._nominal()
+        # Hz, by kind, slowest first; noted by the run
+        found = attribute(getattr(result, "summary", None), "natural_frequencies", default={})
+        self.natural_frequencies: dict[str, list[float]] = {str(kind): list(found[kind]) for kind in found}
         self.bit_radius = float(attribute(self.scene, "bit", "radius", default=0.0))
         self.drilling = "depth_of_cut" in self.history
         self.blades = self._blades()
@@ -116,6 +119,13 @@ class Story:
                 found = attribute(state, theirs)
                 values[ours] = None if found is None else float(found)
         return Nominal(**values)
+
+    @property
+    def blade_passing(self) -> float | None:
+        """Blades per turn times turns per second at the drive's speed, Hz; None without a bit that cuts."""
+        if not self.nominal.speed or self.nominal.depth_of_cut is None or not len(self.blades):
+            return None
+        return len(self.blades) * abs(self.nominal.speed) / (2 * math.pi)
 
     def _blades(self) -> np.ndarray:
         """Angles of the blades on the bit, rad, seen along e3 from the first."""

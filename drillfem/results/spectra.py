@@ -2,8 +2,9 @@
 
 Two spectra. `amplitude_spectrum` is the thesis' convention, 2|X|/N without a window: right for a wave whose
 period fits the record a whole number of times, up to 36 % too small for one that lies half-way between two
-bins (a 30 s record shows a wave of amplitude 14.4 as 12.4), and full of side lobes. `windowed_spectrum`
-(Hann, zero padded) has neither fault; the peaks are taken from it.
+bins (sinc of the distance to the next bin: a 30 s record shows a wave of 14.4 rad/s at 0.4567 Hz as 12.4), and full
+of side lobes. `windowed_spectrum` (Hann, zero padded) has neither fault; the peaks are taken from it.
+`windows` are the stretches of time that the thesis takes its spectra from.
 """
 
 from __future__ import annotations
@@ -16,6 +17,14 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.fft import next_fast_len
 
 Array = NDArray[np.floating]
+
+
+class Window(NamedTuple):
+    """A stretch of a run, from ``start`` to ``end`` (s)."""
+
+    label: str
+    start: float
+    end: float
 
 
 class Peak(NamedTuple):
@@ -44,6 +53,20 @@ def windowed_spectrum(signal: ArrayLike, dt: float, padding: int = 8) -> tuple[A
     length = next_fast_len(padding * len(x), real=True)
     f: Array = np.fft.rfftfreq(length, dt)
     return f, 2 * np.abs(np.fft.rfft(x, length)) / weight.sum()
+
+
+def windows(start: float, end: float) -> list[Window]:
+    """Where to look at a run from ``start`` to ``end`` (s).
+
+    The thesis' windows: S1, S2, S3 for the 200 s of chapter 6; the last 20 s for the 80 s of chapter 5 (caption of
+    figure 5.11), beside the first 20 s. Any other run: its first and its last third.
+    """
+    if abs(start) <= 0.5 and end >= 199.9:
+        return [Window("S1", 0.0, 20.0), Window("S2", 90.0, 110.0), Window("S3", 180.0, 200.0)]
+    if abs(start) <= 0.5 and 79.9 <= end <= 80.1:
+        return [Window("start", 0.0, 20.0), Window("chapter 5", 60.0, 80.0)]
+    third = (end - start) / 3
+    return [Window("first third", start, start + third), Window("last third", end - third, end)]
 
 
 def dominant(
@@ -97,6 +120,20 @@ def dominant_in(history: xr.Dataset, name: str, window: tuple[float, float] | No
     """The strongest waves of a variable of a ``history`` between the times ``window`` (s); see `dominant`."""
     time, signal = evenly(history["time"].values, history[name].values)
     return dominant(signal, time[1] - time[0], window, n, start=time[0]) if len(time) > 1 else []
+
+
+def spectra_in(
+    history: xr.Dataset, name: str, window: tuple[float, float] | None = None
+) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """`amplitude_spectrum` and `windowed_spectrum` of a variable of a ``history`` between the times ``window`` (s).
+
+    The last moment of the window does not count: 20 s at 1 ms are 20 000 samples, and the bins lie 0.05 Hz apart.
+    """
+    time, signal = evenly(history["time"].values, history[name].values)
+    dt = float(time[1] - time[0])
+    if window is not None:
+        signal = signal[(time >= window[0] - dt / 2) & (time < window[1] - dt / 2)]
+    return amplitude_spectrum(signal, dt), windowed_spectrum(signal, dt)
 
 
 def evenly(time: ArrayLike, signal: ArrayLike) -> tuple[Array, Array]:

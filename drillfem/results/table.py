@@ -16,6 +16,7 @@ from rich.table import Table
 
 from .atomic import write_json
 from .history import STANDARD
+from .performance import nominal_performance, performance
 from .result import Result, _json
 from .spectra import dominant_in
 
@@ -56,11 +57,18 @@ def _wave(kind: str, unit: str, scale: float) -> tuple[Row, ...]:
     )
 
 
-WHOLE = (
-    Row("drilled_depth", "depth drilled", "m"),
-    Row("mean_rate_of_penetration", "mean rate of penetration", "mm/s", 1e3),
-)
+def _performance(prefix: str = "", word: str = "") -> tuple[Row, ...]:
+    return (
+        Row(f"{prefix}rate_of_penetration", f"{word}rate of penetration", "mm/s", 1e3),
+        Row(f"{prefix}mechanical_specific_energy", "mechanical specific energy, of the bit", "MPa", 1e-6),
+        Row(f"{prefix}specific_energy_input", "  of what is put in", "MPa", 1e-6),
+        Row(f"{prefix}drilled_per_energy", "depth per energy put in", "mm/MJ", 1e9),
+    )
+
+
+WHOLE = (Row("drilled_depth", "depth drilled", "m"), *_performance("mean_", "mean "))
 LATE = (
+    *_performance(),
     *_wave("torsional", "rad/s", 1.0),
     *_wave("axial", "mm/s", 1e3),
     Row("torsional_stick_fraction", "bit does not turn", "% of time", 100, 3),
@@ -99,7 +107,9 @@ def statistics(result: Result, window: tuple[float, float] | None = None) -> Sta
     if "bit_depth" in history and len(time) > 1:
         depth = history["bit_depth"].values
         numbers["drilled_depth"] = float(depth[-1])
-        numbers["mean_rate_of_penetration"] = float((depth[-1] - depth[0]) / (time[-1] - time[0]))
+        radius = getattr(getattr(result.scene, "bit", None), "radius", 0.0)
+        whole = performance(history, radius, (float(time[0]), float(time[-1])))
+        numbers |= {f"mean_{name}": value for name, value in whole.items()} | performance(history, radius, window)
     for kind, name in (("torsional", "bit_angular_speed"), ("axial", "bit_axial_speed")):
         if name in history:
             for rank, peak in enumerate(dominant_in(history, name, window, 2), start=1):
@@ -130,9 +140,11 @@ def nominal_statistics(result: Result) -> Statistics:
     if nominal is None:
         return {}
     time = result.history["time"].values
+    steady = nominal_performance(scene)
     return {
         "drilled_depth": float(nominal.rate_of_penetration * (time[-1] - time[0])),
-        "mean_rate_of_penetration": float(nominal.rate_of_penetration),
+        **{f"mean_{name}": value for name, value in steady.items()},
+        **steady,
         "mean_bit_torque": float(nominal.torque_on_bit),
         "mean_bit_weight": float(nominal.weight_on_bit),
     }

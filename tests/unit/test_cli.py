@@ -170,6 +170,7 @@ def test_resume(run: Run, tmp_path: Path) -> None:
         (["resume", "OUT"], "no such folder"),
         (["render", "OUT"], "no such folder"),
         (["render", "OUT", "--time", "now"], "--time 'now'"),
+        (["render", "OUT", "--window", "60"], "must be FROM:TO"),
     ],
 )
 def test_bad_input_is_one_line_and_writes_nothing(run: Run, tmp_path: Path, arguments: list[str], message: str) -> None:
@@ -329,9 +330,9 @@ def test_render_demo_and_warm_up_call_their_rooms(run: Run, patched: Callable[..
         solve={"warm_up": lambda: calls.append("warm")},
     )
     run("run", SCENE, "--out", tmp_path / "a", "--until", 1)
-    code, out, _ = run("render", tmp_path / "a", "--time", "0.5", "--field", "spin", "--film")
+    code, out, _ = run("render", tmp_path / "a", "--time", "0.5", "--field", "spin", "--film", "--window", "0:1")
     assert (code, out) == (0, f"{tmp_path / 'a' / 'string.png'}\n")
-    assert calls == [(tmp_path / "a", {"time": 0.5, "field": "spin", "film": True})]
+    assert calls == [(tmp_path / "a", {"time": 0.5, "field": "spin", "film": True, "windows": [(0.0, 1.0)]})]
     assert run("demo", "--out", tmp_path / "d")[0] == 0
     assert calls[-1] == tmp_path / "d"
     code, out, _ = run("warm-up")

@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 
 from drillfem.errors import MissingDependency, SceneError
-from drillfem.render import charts, render_all, render_result
+from drillfem.render import charts, render_all, render_result, style
 from drillfem.render.story import Story
 
 HISTORY_UNITS = {
@@ -362,9 +362,45 @@ def test_stick_intervals() -> None:
     np.testing.assert_allclose(intervals, [(2.01, 3.0), (9.01, 10.0)])
 
 
-def test_windows_of_the_spectra() -> None:
-    assert [w[0] for w in charts.windows(np.linspace(0, 200, 2001))] == ["S1", "S2", "S3"]
-    assert charts.windows(np.linspace(0, 30, 301))[1][1:] == (20.0, 30.0)
+def test_natural_and_blade_frequencies_are_marked_on_the_spectra(tmp_path: Path) -> None:
+    """Where the run noted them; read from the saved summary alone."""
+
+    def lines(result: FakeResult) -> dict[str, list[float]]:
+        """Frequencies of the vertical lines and of the ticks above the first panel, by colour."""
+        found: dict[str, list[float]] = {}
+        story = Story(result)
+        with style.page(600, 400) as figure:
+            axes = figure.add_subplot()
+            axes.set_xlim(0, 25)
+            charts.natural_marks(axes, story, "torsional")
+            charts.passing_mark(axes, story, True)
+            for line in axes.lines:
+                x = line.get_xdata()
+                assert x[0] == x[1]
+                found.setdefault(str(line.get_color()), []).append(float(x[0]))
+        return {colour: sorted(set(x)) for colour, x in found.items()}
+
+    run = drilling(end=2.0, nodes=9)
+    passing = BLADES * OMEGA / (2 * math.pi)
+    assert lines(run) == {style.VERMILION: [pytest.approx(passing)]}
+    run.summary["natural_frequencies"] = {"torsional": [0.453, 1.711, 40.0], "axial": [1.688]}
+    marked = lines(run)
+    assert marked[style.BLUE] == [0.453, 1.711]  # those within the picture
+    assert marked[style.GREEN] == [1.688]
+    plain = charts.spectra(Story(drilling(end=2.0, nodes=9)), tmp_path / "plain.png")
+    with_marks = charts.spectra(Story(run), tmp_path / "marked.png")
+    assert plain is not None and with_marks is not None
+    assert plain.read_bytes() != with_marks.read_bytes()
+
+
+def test_windows_can_be_chosen(tmp_path: Path) -> None:
+    story = Story(drilling(end=12.0, nodes=9))
+    one = charts.spectra(story, tmp_path / "one.png", [(2.0, 8.0)])
+    two = charts.spectra(story, tmp_path / "two.png")
+    assert one is not None and two is not None
+    assert pixels(one).shape[0] < pixels(two).shape[0]  # one row of panels, not two
+    with pytest.raises(SceneError, match="from 0 s to 12 s"):
+        charts.spectra(story, tmp_path / "none.png", [(11.0, 13.0)])
 
 
 def test_space_time_takes_the_finest_part() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from drillfem.results.spectra import amplitude_spectrum, dominant, dominant_in, windowed_spectrum
+from drillfem.results.spectra import amplitude_spectrum, dominant, dominant_in, spectra_in, windowed_spectrum, windows
 
 DT = 1e-3
 
@@ -24,12 +24,17 @@ def test_the_convention_of_the_thesis() -> None:
     assert np.sort(a)[-3] < 1e-9
 
 
-def test_the_trap_of_a_wave_between_two_bins() -> None:
-    x = wave(30, (13.7 / 30, 14.4), mean=14.42)
-    assert amplitude_spectrum(x, DT)[1].max() == pytest.approx(12.4, abs=0.2)
+@pytest.mark.parametrize("apart", [0.0, 0.15, 0.3, 0.5])
+def test_the_trap_of_a_wave_between_two_bins(apart: float) -> None:
+    """Without window a wave that lies ``apart`` from the next bin is shown as sinc(apart) of it."""
+    x = wave(30, ((14 - apart) / 30, 14.4), mean=14.42)
+    shown = amplitude_spectrum(x, DT)[1].max()
+    assert shown == pytest.approx(14.4 * np.sinc(apart), rel=0.02)
+    if apart == 0.3:  # 0.4567 Hz, the first torsional vibration: 14.4 rad/s is shown as 12.4
+        assert shown == pytest.approx(12.4, abs=0.05)
     (peak,) = dominant(x, DT)
     assert peak.amplitude == pytest.approx(14.4, rel=1e-3)
-    assert peak.frequency == pytest.approx(13.7 / 30, abs=1e-3 / 30)
+    assert peak.frequency == pytest.approx((14 - apart) / 30, abs=1e-3 / 30)
 
 
 @pytest.mark.parametrize("shift", np.linspace(0, 1, 11))
@@ -78,3 +83,24 @@ def test_uneven_samples() -> None:
     history = xr.Dataset({"w": ("time", 2 * np.sin(2 * np.pi * 3.2 * time))}, coords={"time": time})
     (peak,) = dominant_in(history, "w", n=1)
     assert peak == pytest.approx((3.2, 2.0), rel=1e-2)
+
+
+def test_the_windows_of_the_thesis() -> None:
+    assert windows(0.0, 200.0) == [("S1", 0, 20), ("S2", 90, 110), ("S3", 180, 200)]
+    assert windows(0.0, 1000.0)[2] == ("S3", 180, 200)
+    assert windows(0.0, 80.0)[-1] == ("chapter 5", 60, 80)
+    assert [w[1:] for w in windows(10.0, 40.0)] == [(10, 20), (30, 40)]
+
+
+def test_both_spectra_of_a_window() -> None:
+    time = DT * np.arange(40001)
+    signal = np.where(time < 20, 5.0 * np.cos(2 * np.pi * 7.4 * time), 2.0 * np.cos(2 * np.pi * 3.225 * time))
+    history = xr.Dataset({"w": ("time", signal)}, coords={"time": time})
+    (f, a), (fine, smooth) = spectra_in(history, "w", (0.0, 20.0))
+    assert f[1] - f[0] == pytest.approx(0.05, rel=1e-12)  # 20 000 samples: 7.4 Hz is a bin
+    assert a[np.isclose(f, 7.4)] == pytest.approx(5.0, rel=1e-9)
+    assert smooth.max() == pytest.approx(5.0, rel=1e-3)
+    (f, a), (fine, smooth) = spectra_in(history, "w", (20.0, 40.0))
+    assert a.max() == pytest.approx(2.0 * 2 / np.pi, rel=0.02)  # half-way between two bins
+    assert smooth.max() == pytest.approx(2.0, rel=1e-3)
+    assert fine[np.argmax(smooth)] == pytest.approx(3.225, abs=0.005)
