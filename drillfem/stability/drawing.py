@@ -15,7 +15,7 @@ from drillfem.stability.transfer import F8
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.colors import BoundaryNorm, Colormap
 
 _STABLE = "#c9dfee"
 _BANDS = 12  # of colour, at most
@@ -59,16 +59,15 @@ def _levels(top: float) -> list[float]:
     return [0.0, *([_SLOW] if step > 2 * _SLOW else []), *(step * np.arange(1, 1 + int(np.ceil(top / step - 1e-9))))]
 
 
-def _colours(levels: list[float]) -> tuple[ListedColormap, BoundaryNorm]:
+def _colours(levels: list[float]) -> tuple[Colormap, BoundaryNorm]:
     from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap, ListedColormap
 
     heat = LinearSegmentedColormap.from_list("heat", _HEAT)
     colours = ListedColormap([heat(x) for x in np.linspace(0, 1, len(levels) - 1)])
-    colours = colours.with_extremes(under=_STABLE, over=_HEAT[-1])
-    return colours, BoundaryNorm(levels, len(levels) - 1)
+    return colours.with_extremes(under=_STABLE, over=_HEAT[-1]), BoundaryNorm(levels, len(levels) - 1)
 
 
-def _map(axes: Axes, chart: StabilityMap, colours: ListedColormap, norm: BoundaryNorm) -> None:
+def _map(axes: Axes, chart: StabilityMap, colours: Colormap, norm: BoundaryNorm) -> None:
     """Growth over speed and weight, boundary, runs, the scene's own point, and where nothing is cut."""
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.lines import Line2D
@@ -156,9 +155,9 @@ def _name_lobes(axes: Axes, chart: StabilityMap) -> None:
     for k in sorted(peak, key=lambda i: -growth[i]):
         if any(abs(speeds[k] - s) < 0.095 * (speeds[-1] - speeds[0]) for s in shown):
             continue
-        margin = 0.07 * (speeds[-1] - speeds[0])
-        shown.append(float(np.clip(speeds[k], speeds[0] + margin, speeds[-1] - margin)))
         kind = " torsion" if chart.torsional[row, k] else ""
+        margin = (0.065 if kind else 0.03) * (speeds[-1] - speeds[0])
+        shown.append(float(np.clip(speeds[k], speeds[0] + margin, speeds[-1] - margin)))
         axes.text(
             shown[-1], height * 1e-3, f"{chart.frequency[row, k]:.1f} Hz{kind}", ha="center", va="center",
             fontsize=10, color=style.INK, path_effects=[withStroke(linewidth=3.0, foreground="white")], zorder=5,
@@ -171,7 +170,7 @@ def _roots(
     chart: StabilityMap,
     speeds: F8,
     roots: Roots,
-    colours: ListedColormap,
+    colours: Colormap,
     norm: BoundaryNorm,
 ) -> None:
     """Frequencies of the unstable roots over speed, with what they lie near: blade passages and natural frequencies."""
