@@ -3,6 +3,9 @@
 In the frame of the bit the rock flows past the blades: dL/dt + omega_b dL/deta = 0. The speed only sets how fast
 time runs, so the forms are written in the angle phi that the bit has turned: dL/dphi + dL/deta = 0. The blade is
 the one point of the circle where the surface may jump: there the boundary switch decides what flows in.
+
+Two discretisations: discontinuous elements (`mass`, `transport`), and continuous ones with a test function that looks
+upstream (`streamline_mass`, `streamline_transport`), whose mass depends on the direction. The inflow is the same.
 """
 
 from __future__ import annotations
@@ -31,6 +34,21 @@ def transport(
     out = (flow + abs(flow)) / 2
     jumps = (out("+") * L("+") - out("-") * L("-")) * (test("+") - test("-")) * interior
     return volume - jumps - out * L * test * ends
+
+
+def streamline_mass(L: Expr, test: Expr, forward: bool, tau: Expr, dx: ufl.Measure) -> ufl.Form:
+    """(dL/dphi, test + tau dtest/dflow): what multiplies the rate where the test functions look upstream."""
+    way = 1 if forward else -1
+    return L * (test + way * tau * test.dx(0)) * dx
+
+
+def streamline_transport(L: Expr, test: Expr, forward: bool, tau: Expr, dx: ufl.Measure, ends: ufl.Measure) -> ufl.Form:
+    """-(dL/dflow, test + tau dtest/dflow), and the known half of the weak inflow: both see the whole residual."""
+    n = ufl.FacetNormal(ufl.domain.extract_unique_domain(L))
+    way = 1 if forward else -1
+    flow = way * n[0]
+    volume = -way * L.dx(0) * (test + way * tau * test.dx(0)) * dx
+    return volume - (abs(flow) - flow) / 2 * L * test * ends
 
 
 def inflow(test: Expr, forward: bool, ends: ufl.Measure) -> ufl.Form:

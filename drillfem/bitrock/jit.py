@@ -16,6 +16,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
+from numba.core.options import DefaultOptions
+from numpy.typing import NDArray
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -24,6 +27,9 @@ _BASE = numba.config.CACHE_DIR or os.path.join(
     os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "drillfem", "numba"
 )
 
+
+#: Without numba's memory management, where the installed version can do without.
+_LEAN: dict[str, Any] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 
 #: Cache folders of the kernels that are loaded.
 _folders: set[str] = set()
@@ -42,19 +48,32 @@ def _digest(path: str) -> str:
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:16]
 
 
-def kernel(*fastmath: str) -> Callable[[F], F]:
-    """Decorator: compile on first call and keep on disk.  ``fastmath``: LLVM flags that are allowed."""
-    flags: set[str] | bool = set(fastmath) or False
+def kernel(*fastmath: str, lean: bool = False) -> Callable[[F], F]:
+    """Decorator: compile on first call and keep on disk.  ``fastmath``: LLVM flags that are allowed.
+
+    ``lean``: the function allocates nothing (no new arrays, no copies of slices), so its arrays need no reference
+    counts; counting those of a surface with its twenty arrays takes longer than a step of a small string.
+    """
+    options: dict[str, Any] = {"fastmath": set(fastmath) or False} | (_LEAN if lean else {})
 
     def compiled(function: F) -> F:
         before = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = os.path.join(_BASE, _digest(inspect.getfile(function)))
         _folders.add(numba.config.CACHE_DIR)
         try:
-            return numba.njit(cache=True, fastmath=flags)(function)
+            return numba.njit(cache=True, **options)(function)
         except RuntimeError:  # no folder can be written: compile in each process
-            return numba.njit(fastmath=flags)(function)
+            return numba.njit(**options)(function)
         finally:
             numba.config.CACHE_DIR = before
 
     return compiled
+
+
+@kernel(lean=True)
+def least(values: NDArray[np.float64]) -> float:
+    """Smallest entry."""
+    smallest = values[0]
+    for i in range(1, values.size):
+        smallest = min(smallest, values[i])
+    return smallest

@@ -37,7 +37,7 @@ class BitForces(NamedTuple):
     wear_torque: float
 
 
-@kernel()
+@kernel(lean=True)
 def ramp(x: float, width: float) -> float:
     """0 for x <= 0, 1 for x >= width, linear between; the unit step (0 at 0) for width = 0."""
     if x <= 0.0:
@@ -47,19 +47,19 @@ def ramp(x: float, width: float) -> float:
     return x / width
 
 
-@kernel()
+@kernel(lean=True)
 def specific_energy(par: NDArray[np.float64], w: float) -> float:
     """Intrinsic specific energy at spin w, Pa (5-7)."""
     return par[EPS1] * ramp(w, par[C3])
 
 
-@kernel()
+@kernel(lean=True)
 def strength(par: NDArray[np.float64], w: float) -> float:
     """Contact strength under the wear flats at spin w, Pa (5-6): sigma_2 when stalled, sigma_1 when turning."""
     return par[SIGMA2] + (par[SIGMA1] - par[SIGMA2]) * ramp(w, par[C2])
 
 
-@kernel()
+@kernel(lean=True)
 def sign_of_spin(par: NDArray[np.float64], w: float) -> float:
     """Direction of the wear-flat torque: clip(w / c3, -1, 1); 1 in the literal law."""
     if par[LITERAL] != 0.0:
@@ -67,13 +67,13 @@ def sign_of_spin(par: NDArray[np.float64], w: float) -> float:
     return ramp(w, par[C3]) - ramp(-w, par[C3])
 
 
-@kernel()
+@kernel(lean=True)
 def wear_fraction(par: NDArray[np.float64], v: float) -> float:
     """Fraction of the contact strength that acts at axial speed v (5-5): nothing while the bit rises."""
     return ramp(v, par[C1])
 
 
-@kernel()
+@kernel(lean=True)
 def law_forces(
     par: NDArray[np.float64], v: float, w: float, depth: float, contact: float
 ) -> tuple[float, float, float, float, float, float]:

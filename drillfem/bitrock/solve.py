@@ -36,7 +36,7 @@ from drillfem.bitrock.surface import SurfaceData, ahead
 F8 = NDArray[np.float64]
 
 
-@kernel()
+@kernel(lean=True)
 def _threshold(free: float, g: float) -> float:
     """Force at which ``free - g W`` reaches zero; infinite where it never does (zero itself counts as contact)."""
     if g > 0.0:
@@ -44,7 +44,7 @@ def _threshold(free: float, g: float) -> float:
     return np.inf if free >= 0.0 else -np.inf
 
 
-@kernel()
+@kernel(lean=True)
 def _pull(
     weight: float,
     limit: bool,
@@ -75,7 +75,7 @@ def _pull(
     return kappa * cut + flat * wear * count
 
 
-@kernel()
+@kernel(lean=True)
 def solve_axial(
     gap: F8, share: F8, gu: float, kappa: float, flat: float, v_free: float, gv: float, c1: float
 ) -> tuple[float, float]:
@@ -130,7 +130,7 @@ def solve_axial(
     return weight, weight - min(max(slope * (v_free - gv * weight), 0.0), weight)
 
 
-@kernel()
+@kernel(lean=True)
 def _at_spin(
     w: float,
     par: F8,
@@ -142,7 +142,7 @@ def _at_spin(
     w_free: float,
     turn_free: float,
     rho: float,
-    ref: F8,
+    ref: F8 | tuple[float, float],
     height: F8,
     slope: F8,
     gap: F8,
@@ -160,7 +160,7 @@ def _at_spin(
     return tc + tf, weight, cut, tc
 
 
-@kernel()
+@kernel(lean=True)
 def solve_bit(
     par: F8,
     share: F8,
@@ -172,7 +172,7 @@ def solve_bit(
     gw: float,
     turn_free: float,
     rho: float,
-    ref: F8,
+    ref: F8 | tuple[float, float],
     height: F8,
     slope: F8,
     w_previous: float,
@@ -198,11 +198,8 @@ def solve_bit(
     # where the spin equation must have changed sign: T <= bound for w <= 0, T >= -bound everywhere
     far_lo = min(w_free - 1.001 * gw * bound, -1.001 * par[C3]) - 1e-12 * abs(w_free)
     far_hi = w_free + 1.001 * gw * bound + 1e-12 * abs(w_free)
-    breaks = np.empty(7)
-    breaks[0], breaks[1], breaks[2], breaks[3] = -par[C3], 0.0, par[C3], par[C2]
-    breaks[4] = w_free - turn_free / rho if rho > 0.0 else 0.0
-    breaks[5], breaks[6] = far_lo, far_hi
-    breaks.sort()
+    straight = w_free - turn_free / rho if rho > 0.0 else 0.0
+    breaks = (-par[C3], 0.0, par[C3], par[C2], straight, far_lo, far_hi)
 
     a = w_previous
     torque, weight, cut, tc = _at_spin(a, *args)
@@ -269,8 +266,8 @@ def solve_bit(
     return weight, torque, cut, weight - cut, tc, torque - tc, v_free - gv * weight, a
 
 
-@kernel()
-def bit_step(
+@kernel(lean=True)
+def bit_step_in(
     par: F8,
     surface: SurfaceData,
     v_free: float,
@@ -282,6 +279,7 @@ def bit_step(
     turn_free: float,
     rho: float,
     w_previous: float,
+    scratch: F8,
 ) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
     """Solve the bit over the rock surface: (W, T, Wc, Wf, Tc, Tf, v, w, U, turn, depth).
 
@@ -289,15 +287,16 @@ def bit_step(
     (rad) the turn from the surface's committed angle.  The rock ahead is linearised where the bit ends up, by
     iteration.
     The surface is not changed: commit it afterwards.  ``depth`` (m) is the signed total depth of cut: the sum of the
-    cutting edges' depths, or, when no edge touches, minus the least clearance times the blades.
+    cutting edges' depths, or, when no edge touches, minus the least clearance times the blades.  ``scratch``
+    (8, m): anything.
     """
     m = surface.share.size
-    ref, height, slope, work = np.zeros(2), np.empty((2, m)), np.empty((2, m)), np.empty(m)
-    now, now_slope, old = np.empty(m), np.empty(m), np.empty(m)
+    height, slope = scratch[0:2], scratch[2:4]
+    work, now, now_slope, old = scratch[4], scratch[5], scratch[6], scratch[7]
     turn = turn_free + rho * (w_previous - w_free)
     last = turn
     for sweep in range(20):
-        ref[0], ref[1] = max(turn, 0.0), min(turn, -0.0)
+        ref = (max(turn, 0.0), min(turn, -0.0))
         ahead(surface, ref[0], True, height[0], slope[0])
         ahead(surface, ref[1], False, height[1], slope[1])
         if sweep > 3 and turn != last and (turn >= 0.0) == (last >= 0.0):
@@ -326,3 +325,22 @@ def bit_step(
     if best < 0.0:
         depth = best * par[BLADES]
     return res[0], res[1], res[2], res[3], res[4], res[5], res[6], res[7], u, turn, depth
+
+
+@kernel()
+def bit_step(
+    par: F8,
+    surface: SurfaceData,
+    v_free: float,
+    gv: float,
+    u_free: float,
+    gu: float,
+    w_free: float,
+    gw: float,
+    turn_free: float,
+    rho: float,
+    w_previous: float,
+) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
+    """`bit_step_in` with scratch memory of its own."""
+    scratch = np.empty((8, surface.share.size))
+    return bit_step_in(par, surface, v_free, gv, u_free, gu, w_free, gw, turn_free, rho, w_previous, scratch)

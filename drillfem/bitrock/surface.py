@@ -7,10 +7,14 @@ leaves ``max(U, rock ahead)`` behind it: it cuts, slides, or passes above the ro
 the profile passes under the blade and lies ahead of it again.  Equal blades share one sector; unequal ones have
 a sector each, and what leaves sector i meets blade i - 1, the one behind.
 
-Two schemes behind one interface:
+Four schemes behind one interface:
 
-``dg``       discontinuous Galerkin of degree k in eta, fourth-order Runge-Kutta in phi;
+``dg``       discontinuous Galerkin of degree k in eta;
+``supg``     continuous linear elements in eta with a streamline test function, inflow imposed weakly;
+``upwind``   first-order upwinding (discontinuous Galerkin of degree 0), as most published codes have it;
 ``profile``  the exact moving profile: a ring of knots with cubic pieces between them.
+
+The first three march in phi with the classical Runge-Kutta method of fourth order.
 """
 
 from __future__ import annotations
@@ -20,21 +24,32 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from drillfem.bitrock.dg import DGData, DGOperators, dg_ahead, dg_commit, dg_operators, dg_setup
+from drillfem.bitrock.dg import (
+    PAD,
+    VALID,
+    DGData,
+    DGOperators,
+    N,
+    dg_ahead,
+    dg_commit,
+    dg_setup,
+    surface_operators,
+    surface_order,
+)
 from drillfem.bitrock.jit import kernel
-from drillfem.bitrock.profile import ProfileData, profile_ahead, profile_commit, profile_setup, sector_area
+from drillfem.bitrock.profile import FIRST, SIZE, ProfileData, profile_ahead, profile_commit, profile_setup, sector_area
 
 if TYPE_CHECKING:
     from drillfem.scene import Scene
 
 F8 = NDArray[np.float64]
-DG, PROFILE = 0, 1
+SCHEMES = ("dg", "supg", "upwind", "profile")
 
 
 class SurfaceData(NamedTuple):
-    """What the compiled functions need: one type for both schemes, the unused one is a dummy."""
+    """What the compiled functions need: one type for all schemes, what is unused is a dummy."""
 
-    scheme: int
+    exact: bool  # the moving profile; else finite elements
     width: F8  # (m,) rad, sector behind each blade
     share: F8  # (m,) blades that a sector stands for
     removed: F8  # (1,) integral of the depth of cut (all blades) over the turn, m rad
@@ -42,26 +57,26 @@ class SurfaceData(NamedTuple):
     profile: ProfileData
 
 
-@kernel()
+@kernel(lean=True)
 def ahead(surface: SurfaceData, turn: float, forward: bool, height: F8, slope: F8) -> None:
     """Fill ``height`` (m,) with what the blades meet after ``turn`` (rad, from the committed angle), ``slope`` d/dturn.
 
     ``forward`` selects the rock ahead (turn >= 0) or the rock that comes back under the blades (turn <= 0).
     Valid up to the narrowest sector: beyond it the blade would meet rock cut during this same turn.
     """
-    if surface.scheme == DG:
-        dg_ahead(surface.dg, surface.width, turn, forward, height, slope)
-    else:
+    if surface.exact:
         profile_ahead(surface.profile, surface.width, turn, forward, height, slope)
+    else:
+        dg_ahead(surface.dg, surface.width, turn, forward, height, slope)
 
 
-@kernel()
+@kernel(lean=True)
 def commit(surface: SurfaceData, turn: float, u0: float, u1: float, s0: float, s1: float) -> None:
     """Turn by ``turn`` (rad, any size and sign) while the bit's depth goes from u0 to u1 with slopes s0, s1 (m/rad)."""
-    if surface.scheme == DG:
-        surface.removed[0] += dg_commit(surface.dg, surface.width, surface.share, turn, u0, u1, s0, s1)
-    else:
+    if surface.exact:
         surface.removed[0] += profile_commit(surface.profile, surface.width, surface.share, turn, u0, u1, s0, s1)
+    else:
+        surface.removed[0] += dg_commit(surface.dg, surface.width, surface.share, turn, u0, u1, s0, s1)
 
 
 class RockSurface:
@@ -69,11 +84,11 @@ class RockSurface:
 
     Parameters
     ----------
-    scheme : "dg" (``degree``, ``elements`` per sector) or "profile".
+    scheme : "dg" (``degree``, ``elements`` per sector), "supg" or "upwind" (``elements``), or "profile".
     blades : number of blades.
     blade_angles : (blades,) rad, increasing within one turn in the direction of drilling; None for equal spacing.
-    incline : dL/deta of the first profile, m/rad: -d_0 / (2 pi) in nominal drilling (spec 7.6), L(0) = 0.
-    operators : DG operators on one sector, when assembled elsewhere (from the UFL form); overrides degree and elements.
+    incline : dL/deta of the first profile, m/rad: -d_0 / (2 pi) in nominal drilling, L(0) = 0.
+    operators : of the scheme on one sector, when assembled elsewhere (from the UFL form); override degree and elements.
     """
 
     def __init__(
@@ -87,8 +102,8 @@ class RockSurface:
         incline: float = 0.0,
         operators: DGOperators | None = None,
     ) -> None:
-        if scheme not in ("dg", "profile"):
-            raise ValueError(f"surface: scheme = {scheme!r}: must be dg or profile")
+        if scheme not in SCHEMES:
+            raise ValueError(f"surface: scheme = {scheme!r}: must be one of {', '.join(SCHEMES)}")
         turn = 2 * np.pi
         if blade_angles is None:
             width, share = np.array([turn / blades]), np.array([float(blades)])
@@ -98,20 +113,33 @@ class RockSurface:
             width[0] += turn
             if angle.shape != (blades,) or np.any(width <= 0):
                 raise ValueError("surface: blade_angles must be one angle per blade, increasing within one turn")
-        dg = scheme == "dg"
+        exact = scheme == "profile"
         if operators is None:
-            operators = dg_operators(degree if dg else 0, elements if dg else 1, float(width[0]))
+            operators = (
+                surface_operators("upwind", 0, 1, 1.0)
+                if exact
+                else surface_operators(scheme, degree, elements, float(width[0]))
+            )
         # the unused scheme is kept as small as its compiled type allows
         self.data = SurfaceData(
-            DG if dg else PROFILE,
+            exact,
             width,
             share,
             np.zeros(1),
-            dg_setup(operators, width.size),
-            profile_setup(width) if not dg else profile_setup(width, 2),
+            dg_setup(operators, width),
+            profile_setup(width) if exact else profile_setup(width, 2),
         )
-        self._unit_nodes = operators.nodes / operators.width
-        self.set_profile([lambda eta: incline * eta] * width.size)
+        order = surface_order(operators)
+        self._unit_nodes = operators.nodes[order] / operators.width
+        self._unit_mass = operators.mass.sum(axis=0)[order] / operators.width
+        if exact:
+            self.set_profile([lambda eta: incline * eta] * width.size)
+        else:
+            # the straight profile that the scheme itself keeps: upwinding carries it half an element on
+            rate = operators.rate()[0]
+            self._heights[:] = (
+                -incline * width[:, None] * np.linalg.solve(operators.width * rate, np.ones(order.size))[order]
+            )
 
     @classmethod
     def from_scene(cls, scene: Scene, operators: DGOperators | None = None) -> RockSurface:
@@ -133,17 +161,14 @@ class RockSurface:
         """Set the heights: one function of eta per sector.  ``knots``: pieces per sector of the scheme "profile"."""
         data = self.data
         for i, function in enumerate(height):
-            if data.scheme == DG:
-                data.dg.height[i] = function(self._unit_nodes * data.width[i])
+            if not data.exact:
+                self._heights[i] = function(self._unit_nodes * data.width[i])
                 continue
             p = data.profile
             key = np.linspace(0.0, data.width[i], knots + 1)
-            p.first[i], p.size[i] = 0, knots + 1
-            p.key[i, : knots + 1] = p.phi[0] + key
             values = np.broadcast_to(function(data.width[i] - key), key.shape)
-            p.height[i, : knots + 1] = values
             chord = np.diff(values) / np.diff(key)
-            p.after[i, : knots + 1], p.before[i, : knots + 1] = np.append(chord, 0.0), np.append(0.0, chord)
+            self._put(i, np.stack([p.phi[0] + key, values, np.append(0.0, chord), np.append(chord, 0.0)], axis=1))
 
     @property
     def removed(self) -> float:
@@ -171,46 +196,54 @@ class RockSurface:
     def integral(self) -> float:
         """Integral of the height over all sectors, m rad; it grows by exactly what `removed` books."""
         data = self.data
-        if data.scheme == DG:
-            return float(np.sum(data.share * data.width * (data.dg.height @ data.dg.mean)))
+        if not data.exact:
+            return float(np.sum(data.share * data.width * (self._heights @ self._unit_mass)))
         return float(sum(data.share[i] * sector_area(data.profile, i) for i in range(data.width.size)))
 
     def profile(self) -> list[tuple[F8, F8]]:
         """Pairs (eta, height) of each sector, eta increasing from the blade backwards, for pictures."""
         data = self.data
-        if data.scheme == DG:
-            return [(self._unit_nodes * w, data.dg.height[i].copy()) for i, w in enumerate(data.width)]
+        if not data.exact:
+            return [(self._unit_nodes * w, self._heights[i].copy()) for i, w in enumerate(data.width)]
         out = []
         for i, w in enumerate(data.width):
-            key, height, _, _ = self._knots(i)
+            key, height = self._knots(i)[:, :2].T
             out.append(((data.profile.phi[0] + w - key)[::-1], height[::-1]))
         return out
 
-    def _knots(self, sector: int) -> tuple[F8, F8, F8, F8]:
+    @property
+    def _heights(self) -> F8:
+        """Writable view (m, n) of the degrees of freedom; what was derived from them is forgotten."""
+        dg, m = self.data.dg, self.data.width.size
+        n, pad = dg.number[N], dg.number[PAD]
+        dg.number[VALID : VALID + 2] = 0
+        return dg.state[: m * (n + 2 * pad)].reshape(m, -1)[:, pad : pad + n]
+
+    def _knots(self, sector: int) -> F8:
+        """Knots (k, 4) of a sector: key, height, slopes on both sides."""
         p = self.data.profile
-        index = (p.first[sector] + np.arange(p.size[sector])) % p.key.shape[1]
-        return p.key[sector, index], p.height[sector, index], p.before[sector, index], p.after[sector, index]
+        return p.ring[sector, (p.number[FIRST, sector] + np.arange(p.number[SIZE, sector])) % p.ring.shape[1]]
+
+    def _put(self, sector: int, knots: F8) -> None:
+        p = self.data.profile
+        p.number[:, sector] = 0, len(knots)
+        p.ring[sector, : len(knots)] = knots
 
     def state_dict(self) -> dict[str, F8]:
         """The state as plain arrays: `load` restores it to the bit."""
         data = self.data
         state = {"removed": data.removed.copy()}
-        if data.scheme == DG:
-            return state | {"height": data.dg.height.copy()}
-        knots = {f"knots_{i}": np.stack(self._knots(i)) for i in range(data.width.size)}
-        return state | {"phi": data.profile.phi.copy()} | knots
+        if not data.exact:
+            return state | {"height": self._heights.copy()}
+        return state | {"phi": data.profile.phi.copy()} | {f"knots_{i}": self._knots(i) for i in range(data.width.size)}
 
     def load(self, state: dict[str, Any]) -> None:
         """Take over a state of `state_dict` (of a surface made in the same way)."""
         data = self.data
         data.removed[:] = state["removed"]
-        if data.scheme == DG:
-            data.dg.height[:] = state["height"]
+        if not data.exact:
+            self._heights[:] = state["height"]
             return
-        p = data.profile
-        p.phi[:] = state["phi"]
+        data.profile.phi[:] = state["phi"]
         for i in range(data.width.size):
-            knots = np.asarray(state[f"knots_{i}"])
-            p.first[i], p.size[i] = 0, knots.shape[1]
-            for array, values in zip((p.key, p.height, p.before, p.after), knots, strict=True):
-                array[i, : knots.shape[1]] = values
+            self._put(i, np.asarray(state[f"knots_{i}"]))

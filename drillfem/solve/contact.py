@@ -31,15 +31,16 @@ def rock_picture(surface: RockSurface, points: int = 97) -> dict[str, Array]:
 def surface_of(scene: Scene) -> RockSurface:
     """Rock surface of a scene, in nominal drilling.
 
-    The operators of scheme dg come from the UFL form where DOLFINx is installed; NumPy's agree with them to round-off.
+    The operators of finite elements come from the UFL forms where DOLFINx is installed; those by NumPy are the same.
     """
     bit, rock = scene.bit, scene.rock
     assert bit is not None and rock is not None
     operators = None
-    if rock.surface.scheme == "dg" and find_spec("dolfinx") is not None and find_spec("petsc4py") is not None:
+    surface, here = rock.surface, find_spec("dolfinx") is not None and find_spec("petsc4py") is not None
+    if surface.scheme != "profile" and here:
         from ..models.rock import advection_operators
 
-        operators = advection_operators(rock.surface.degree, rock.surface.elements, 2 * np.pi / bit.blades)
+        operators = advection_operators(surface.degree, surface.elements, 2 * np.pi / bit.blades, surface.scheme)
     return RockSurface.from_scene(scene, operators)
 
 

@@ -1,13 +1,13 @@
-"""The rock surface: both schemes against exact histories, orders, books of volume, backward turns, unequal blades."""
+"""The rock surface: all schemes against exact histories, orders, books of volume, backward turns, unequal blades."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from drillfem.bitrock import RockSurface, dg_operators
+from drillfem.bitrock import SCHEMES, RockSurface, dg_operators, supg_operators, surface_operators
 
-SCHEMES = ["dg", "profile"]
+ACCURATE = ["dg", "profile"]
 ANGLES = [0.0, 0.9, 2.1, 3.0, 4.4, 5.3]
 
 
@@ -130,10 +130,35 @@ def test_wild_history_against_a_fine_array(scheme, limit, angles):
     assert surface.removed > 0
 
 
+@pytest.mark.parametrize("scheme, limit", [("dg", 1e-12), ("supg", 1e-12), ("upwind", 1e-12), ("profile", 1e-12)])
+@pytest.mark.parametrize("angles", [None, ANGLES])
+def test_rock_removed_is_rock_gone_from_the_profile(scheme, limit, angles):
+    """At every moment of a wild history: drilling, hops, turns back; and far from where the bit started."""
+    phi, u = history()
+    surface = RockSurface(scheme, 6, angles, degree=2, elements=16, incline=-2e-4)
+    start, worst = surface.integral(), 0.0
+    for k in range(len(phi) - 1):
+        surface.commit(phi[k + 1] - phi[k], u[k], u[k + 1])
+        worst = max(worst, abs(surface.integral() - start - surface.removed))
+    assert surface.removed > 0.05 and worst < limit * surface.removed
+
+
+def test_what_is_cut_never_comes_back():
+    """Rock is removed, not added: in no step of a wild history is the volume booked below zero."""
+    phi, u = history()
+    for scheme in ("dg", "supg", "upwind"):
+        surface = RockSurface(scheme, 6, incline=-2e-4)
+        before = 0.0
+        for k in range(len(phi) - 1):
+            surface.commit(phi[k + 1] - phi[k], u[k], u[k + 1])
+            assert surface.removed >= before
+            before = surface.removed
+
+
 def test_schemes_agree_on_the_volume_of_a_wild_history():
     phi, u = history()
     removed = []
-    for scheme in SCHEMES:
+    for scheme in ACCURATE:
         surface = RockSurface(scheme, 6, degree=3, elements=32, incline=-2e-4)
         for k in range(len(phi) - 1):
             surface.commit(phi[k + 1] - phi[k], u[k], u[k + 1])
@@ -141,9 +166,9 @@ def test_schemes_agree_on_the_volume_of_a_wild_history():
     assert removed[0] == pytest.approx(removed[1], rel=2e-3)
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme, elements, limit", [("profile", 0, 1e-6), ("dg", 24, 1e-6), ("supg", 96, 1e-6)])
 @pytest.mark.parametrize("angles", [None, ANGLES])
-def test_off_bottom_and_backwards_leave_the_rock_alone(scheme, angles):
+def test_off_bottom_and_backwards_leave_the_rock_alone(scheme, elements, limit, angles):
     """A smooth hole bottom passes under the blades, forwards and backwards, round more than once, and stays itself."""
     blades = np.array([0.0]) if angles is None else np.array(angles)
     waves = 6 if angles is None else 5
@@ -151,7 +176,7 @@ def test_off_bottom_and_backwards_leave_the_rock_alone(scheme, angles):
     def bottom(angle):
         return 1e-4 * np.sin(waves * angle) ** 2
 
-    surface = RockSurface(scheme, 6, angles, degree=3, elements=24)
+    surface = RockSurface(scheme, 6, angles, degree=3, elements=max(elements, 1))
     surface.set_profile([lambda eta, a=a: bottom(a - eta) for a in blades], knots=256)
     above, phi = -1.0, 0.0
     for turn in [*np.resize([0.03, -0.02, 0.05, -0.08], 200), -0.4, 0.7, -5.0, 2 * np.pi]:
@@ -159,15 +184,15 @@ def test_off_bottom_and_backwards_leave_the_rock_alone(scheme, angles):
         phi += turn
     assert surface.removed == pytest.approx(0.0, abs=1e-15)
     for a, (eta, height) in zip(blades, surface.profile(), strict=True):
-        np.testing.assert_allclose(height, bottom(a + phi - eta), atol=1e-6)
+        np.testing.assert_allclose(height, bottom(a + phi - eta), atol=limit)
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", ["dg", "supg", "profile"])
 @pytest.mark.parametrize("turn", [0.0, 0.004, 0.02, 0.07, 0.4, -0.004, -0.02, -0.3])
 @pytest.mark.parametrize("angles", [None, ANGLES])
 def test_height_ahead_is_what_a_turn_meets(scheme, turn, angles):
     widths = RockSurface(scheme, 6, angles).data.width
-    surface = RockSurface(scheme, 6, angles, degree=3, elements=32)
+    surface = RockSurface(scheme, 6, angles, degree=3, elements=256 if scheme == "supg" else 32)
     shapes = [lambda eta, i=i: 1e-4 * np.sin(6 * eta + i) for i in range(len(widths))]
     surface.set_profile(shapes, knots=512)
     height, slope = surface.ahead(turn)
@@ -180,7 +205,7 @@ def test_height_ahead_is_what_a_turn_meets(scheme, turn, angles):
     before = surface.state_dict()
     surface.commit(turn, deep, deep)
     if turn >= 0:
-        np.testing.assert_allclose(surface.ahead(0.0)[0], height, atol=1e-9)
+        np.testing.assert_allclose(surface.ahead(0.0)[0], height, atol=5e-9)
     surface.load(before)
     np.testing.assert_array_equal(surface.ahead(turn)[0], height)
 
@@ -194,7 +219,7 @@ def test_stalled_bit_does_not_fill_the_profile():
         u1 = u + abs(rng.normal(0, 1e-8))
         surface.commit(turn, u, u1, rng.normal(), rng.normal())
         u = u1
-    assert surface.data.profile.size[0] < 4200
+    assert surface.data.profile.number[1, 0] < 4200
     assert surface.integral() - start == pytest.approx(surface.removed, abs=1e-12)
     eta, height = surface.profile()[0]
     assert height.max() <= u + 1e-12 and np.all(np.diff(eta) >= 0)
@@ -225,9 +250,9 @@ def test_checkpoint_restores_to_the_bit():
                 np.testing.assert_array_equal(array, resumed.state_dict()[name])
 
 
-@pytest.mark.parametrize("degree", [0, 1, 2, 3])
-def test_operators(degree):
-    op = dg_operators(degree, 5, 2.0)
+@pytest.mark.parametrize("scheme, degree", [("dg", 0), ("dg", 1), ("dg", 2), ("dg", 3), ("supg", 1), ("upwind", 0)])
+def test_operators(scheme, degree):
+    op = surface_operators(scheme, degree, 5, 2.0)
     one = np.ones(op.nodes.size)
     assert one @ op.mass @ one == pytest.approx(2.0)
     # conservation: what enters minus what leaves
@@ -236,10 +261,91 @@ def test_operators(degree):
     assert one @ op.left == pytest.approx(1.0) and one @ op.right == pytest.approx(1.0)
     # a straight profile moves without change of shape
     if degree:
-        rate = np.linalg.solve(op.mass, op.forward @ op.nodes + op.left * 0.0)
-        np.testing.assert_allclose(rate, -1.0, atol=1e-11)
-        rate = np.linalg.solve(op.mass, op.backward @ op.nodes + op.right * 2.0)
-        np.testing.assert_allclose(rate, 1.0, atol=1e-11)
+        (forward, left), (backward, right) = op.rate(True), op.rate(False)
+        np.testing.assert_allclose(forward @ op.nodes + left * 0.0, -1.0, atol=1e-11)
+        np.testing.assert_allclose(backward @ op.nodes + right * 2.0, 1.0, atol=1e-11)
+
+
+def test_streamline_operators_mirror_and_lose_no_rock():
+    op = supg_operators(9, 1.7)
+    assert op.mass_backward is not None
+    flip = np.arange(9, -1, -1)
+    np.testing.assert_allclose(op.mass_backward, op.mass[np.ix_(flip, flip)], atol=1e-16)
+    np.testing.assert_allclose(op.backward, op.forward[np.ix_(flip, flip)], atol=1e-15)
+    # both masses weigh the profile in the same way: turning back changes no volume
+    np.testing.assert_allclose(op.mass.sum(axis=0), op.mass_backward.sum(axis=0), atol=1e-16)
+    # without the streamline part the mass is symmetric, with it it is not
+    assert np.abs(op.mass - op.mass.T).max() > 0.01
+    plain = supg_operators(9, 1.7, 0.0)
+    np.testing.assert_array_equal(plain.mass, plain.mass.T)
+    np.testing.assert_array_equal(plain.mass, plain.mass_backward)
+
+
+def test_order_of_streamline_elements():
+    cells = np.array([16, 32, 64])
+    assert -order(cells, [harmonic_error("supg", 2e-3, elements=n) for n in cells]) > 2.7
+
+
+def test_upwinding_is_discontinuous_galerkin_of_degree_zero():
+    phi, u = history(1500)
+    surfaces = [
+        RockSurface("upwind", 6, elements=24, incline=-2e-4),
+        RockSurface("dg", 6, degree=0, elements=24, incline=-2e-4),
+    ]
+    for k in range(1500):
+        for surface in surfaces:
+            surface.commit(phi[k + 1] - phi[k], u[k], u[k + 1])
+    np.testing.assert_array_equal(surfaces[0].profile()[0][1], surfaces[1].profile()[0][1])
+
+
+@pytest.mark.parametrize("scheme", ["dg", "supg", "upwind"])
+@pytest.mark.parametrize("elements", [1, 2, 3, 8])
+def test_few_elements_see_what_the_step_will_do(scheme, elements):
+    """Where the outflow feels the inflow within a step, what is met is still what the step lets out: a level stays."""
+    surface = RockSurface(scheme, 6, degree=2, elements=elements)
+    surface.set_profile([lambda eta: 0.0 * eta + 7.0])
+    for turn in (1e-3, 0.1, 0.9, -0.4):
+        assert surface.ahead(turn)[0][0] == pytest.approx(7.0, abs=1e-12)
+        assert surface.ahead(turn)[1][0] == pytest.approx(0.0, abs=1e-11)
+        surface.commit(turn, 7.0, 7.0)
+    np.testing.assert_allclose(surface.profile()[0][1], 7.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("scheme", ["dg", "supg", "upwind"])
+@pytest.mark.parametrize("turn, limit", [(0.013, 1e-9), (0.05, 5e-5), (0.21, 3e-4), (0.33, 3e-4), (-0.05, 5e-5)])
+def test_prediction_is_the_step(scheme, turn, limit):
+    """The height ahead is what the Runge-Kutta steps of the commit then let out, nearly whatever enters meanwhile."""
+    surface = RockSurface(scheme, 6, degree=2, elements=24)
+    surface.set_profile([lambda eta: np.sin(5 * eta) - 2 * eta])
+    predicted = surface.ahead(turn)[0][0]
+    slope = (surface.ahead(turn + 1e-6)[0][0] - surface.ahead(turn - 1e-6)[0][0]) / 2e-6
+    assert surface.ahead(turn)[1][0] == pytest.approx(slope, abs=1e-5)
+    before = surface.state_dict()
+    surface.commit(turn, 0.0, 0.3 * turn)
+    height = surface.profile()[0][1]
+    if turn > 0:
+        assert surface.ahead(0.0)[0][0] == pytest.approx(predicted, abs=limit)
+    elif scheme != "upwind":  # what came back under the blade is now at its foot
+        assert height[0] == pytest.approx(predicted, abs=limit)
+    surface.load(before)
+    assert surface.ahead(turn)[0][0] == predicted
+
+
+@pytest.mark.parametrize("scheme", ["dg", "supg", "upwind"])
+def test_checkpoint_in_the_middle_of_predictions(scheme):
+    """What is kept between commits is forgotten with the state it came from."""
+    phi, u = history(1000)
+    whole, resumed = (RockSurface(scheme, 6, incline=-2e-4) for _ in range(2))
+    for k in range(60):
+        whole.ahead(0.001 * (k % 7))
+        if k == 30:
+            resumed.ahead(0.2)
+            resumed.load(whole.state_dict())
+        turn = phi[k + 1] - phi[k]
+        if k >= 30:
+            np.testing.assert_array_equal(whole.ahead(turn), resumed.ahead(turn))
+            resumed.commit(turn, u[k], u[k + 1])
+        whole.commit(turn, u[k], u[k + 1])
 
 
 def test_operators_from_elsewhere_are_rescaled_and_may_be_renumbered():
@@ -265,6 +371,16 @@ def test_operators_from_elsewhere_are_rescaled_and_may_be_renumbered():
 
 
 @pytest.mark.dolfinx
+def test_streamline_operators_are_those_of_the_ufl_forms():
+    pytest.importorskip("dolfinx")
+    from drillfem.models.rock import advection_operators
+
+    own, form = surface_operators("supg", 1, 7, 1.1), advection_operators(1, 7, 1.1, "supg")
+    for name in ("mass", "mass_backward", "forward", "backward", "left", "right", "nodes"):
+        np.testing.assert_allclose(getattr(own, name), getattr(form, name), rtol=0, atol=1e-12, err_msg=name)
+
+
+@pytest.mark.dolfinx
 @pytest.mark.parametrize("degree", [0, 1, 2, 3])
 def test_operators_agree_with_the_ufl_forms(degree):
     pytest.importorskip("dolfinx")
@@ -283,7 +399,7 @@ def test_operators_agree_with_the_ufl_forms(degree):
 @pytest.mark.parametrize(
     "bad",
     [
-        {"scheme": "upwind"},
+        {"scheme": "central"},
         {"blade_angles": [0.0, 1.0]},
         {"blade_angles": [0, 2, 1, 3, 4, 5]},
         {"degree": -1},
