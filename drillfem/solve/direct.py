@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 
 from ..compat import Array
+from ..errors import SimulationError
 from ..models.initial import initial_state
 from ..models.rod import Rod
 from ..results import ResultWriter
 from .audit import COMMON, TIP, WORKS, EnergyAudit, variables
 from .contact import RockContact
 from .dynamics import Stepper
+from .guards import runaway
 from .interrupt import Interrupts
 from .newton import turn_between
 from .statics import Statics
@@ -227,7 +229,10 @@ def run_dynamic(scene: Any, writer_of: Callable[..., ResultWriter], until: float
                     interrupts.check()
                     t = run.step(min(next_row, next_picture, next_save, until))
                     if t >= next_row - tiny or t >= until - tiny:
-                        writer.append(t, run.row(t))
+                        row = run.row(t)
+                        writer.append(t, row)
+                        if why := runaway({"time": t} | row, scene):
+                            raise SimulationError(why)
                         next_row = next(rows)
                         if progress is not None:
                             progress(t)
