@@ -1,16 +1,22 @@
-"""The straight string condensed onto the bit: exact linear dynamics between the ends, the bit law solved per step.
+"""The straight string condensed onto the bit: linear dynamics between the ends, the bit law solved per step.
 
 An axial-torsional string is linear except at the bit.  Each of its two channels,
 ``M q'' + C q' + K q = load - e_bit P``, is brought to modal coordinates once; a step then propagates every mode by
 its exact solution, so that only the history of the bit force P within the step is approximated:
 
-* the cutting force is linear in the step while the bit cuts at both ends of it (second order);
+* where the bit cuts throughout the step, the cutting force is a parabola through its values at the start, the middle
+  and the end of the step (fourth order), and the wear-flat force is constant;
 * the wear-flat force is constant in the step and takes its end value, and so is everything while the bit is
   stalled, turns backwards, leaves the bottom or lands: a linear multiplier would ring where the bit sticks;
-* a step in which the wear-flat force changes, or that is not cutting throughout, is divided so that the fastest mode is
-  resolved: on longer steps the modes beyond the sampling rate answer a sticking bit with the wrong sign, and it rings.
+* a step in which the wear-flat force changes, or that is not cutting throughout, is divided: so that the fastest mode
+  is resolved (on longer steps the modes beyond the sampling rate answer a sticking bit with the wrong sign, and it
+  rings), and so that the moment at which it sticks or slips is.
 
 At the end of the step the modes answer the bit force by affine maps, and `drillfem.bitrock` solves the bit on them.
+
+Two common integrators of the string can take the place of the exact modes, to compare: the trapezoidal rule and
+explicit central differences (velocity form).  The bit is solved in the same way, with a cutting force linear in the
+step.
 """
 
 from __future__ import annotations
@@ -39,12 +45,23 @@ from drillfem.bitrock.law import (
     law_forces,
     wear_fraction,
 )
-from drillfem.bitrock.solve import bit_step
+from drillfem.bitrock.solve import bit_step_in
 from drillfem.bitrock.surface import RockSurface, SurfaceData, ahead, commit
 from drillfem.models.straight import Channel
 
 F8 = NDArray[np.float64]
 TopMotion = Callable[[F8], tuple[F8, F8]]
+
+INTEGRATORS = ("exact", "trapezoidal", "explicit")
+"""Time integrators of the string between its ends."""
+LEAST_PARTS = {False: 2, True: 8}
+"""Least division of a step in which a turning bit begins or ceases to stick axially, stalls or leaves the bottom.
+
+For a rigid mass on the bit (True) these steps are few: sticking is not one of them, only its beginning and end.
+"""
+ROUGH_PARTS = {False: 2, True: 4}
+"""Least division of a step that starts with the bit stalled, turning backwards, or off bottom."""
+
 
 OUTPUTS = (
     "time",
@@ -79,25 +96,30 @@ UNITS = dict(
 
 
 class Modes(NamedTuple):
-    """A channel in mass-normalised modal coordinates, for the whole step (first index 0) and for a part of it (1).
+    """A channel in mass-normalised modal coordinates, for the whole step (first index 0) and for parts of it (1, 2).
 
     Few arrays, because the compiled functions hand them on in every step.
     """
 
-    table: F8  # (2, rows, n): one number per mode in the rows named below
-    number: F8  # (2, numbers named below)
-    big: F8  # (2, 2, 2n, 2n): step matrix and dissipation form where damping couples the modes; else (2, 2, 1, 1)
+    table: F8  # (3, rows, n): one number per mode in the rows named below
+    number: F8  # (3, numbers named below)
+    big: F8  # (3, 2, 2n, 2n): step matrix and dissipation form where damping couples the modes; else (3, 2, 1, 1)
 
 
-# rows of Modes.table.  Step matrix of (x, v); answers of x, v to a unit bit force constant over the step (CX, CV) and
-# to one that grows from 0 to 1 (RX, RV); dissipation over the step as a quadratic form of (x, v, constant, growing)
-(E11, E12, E21, E22, CX, CV, RX, RV, QXX, QXV, QVV, QXP, QVP, QXR, QVR) = range(15)
+# The bit force in a step is p + r x + b 4 x (1 - x), x from 0 to 1.
+# Rows of Modes.table.  Step matrix of (x, v); answers of x, v to the three unit forces (C, R, B); dissipation over the
+# step as a quadratic form of (x, v, p, r, b); position of the bit in the middle of the step from (x, v)
+(E11, E12, E21, E22, CX, CV, RX, RV, BX, BV, QXX, QXV, QVV, QXP, QVP, QXR, QVR, QXB, QVB, MX, MV) = range(21)
 # mode shapes at bit and top; omega^2; static position under load and mean bit force; momentum in a uniform motion;
 # static answer to a uniform acceleration; its restoring and damping rows; constant load
-(BIT, HOOK, SQUARE, REST, UNIFORM, STILL, PULL, DRAG, LOAD) = range(15, 24)
-# numbers: rest of the dissipation form; bit force that balances the load on the uniform motion; answers of the bit to
-# the two unit forces, against the force (GU, GV constant; HU, HV growing); total inertia; UNIFORM . BIT
-(QPP, QPR, QRR, MEAN, GU, GV, HU, HV, INERTIA, REACH) = range(10)
+(BIT, HOOK, SQUARE, REST, UNIFORM, STILL, PULL, DRAG, LOAD) = range(21, 30)
+# Numbers: rest of the dissipation form; bit force that balances the load on the uniform motion; answers of the bit to
+# the unit forces, against the force (U position and V speed at the end, M position in the middle); total inertia;
+# UNIFORM . BIT; is there damping; is the step of fourth order; part of a step by which the work of a linear force
+# exceeds the mean force times the path, per change of speed (1/12 where the modes are exact); speed at once per force;
+# is the channel a rigid mass
+(QPP, QPR, QRR, QPB, QRB, QBB, MEAN, GU, GV, GM, HU, HV, HM, KU, KV, KM) = range(16)
+(INERTIA, REACH, DAMPED, FOURTH, TWELFTH, AT_ONCE, RIGID) = range(16, 23)
 
 
 def _step_matrices(a: F8, loss: F8, step: float) -> tuple[F8, F8]:
@@ -123,10 +145,87 @@ def _step_matrices(a: F8, loss: F8, step: float) -> tuple[F8, F8]:
     return e, q
 
 
-def _condense(
-    channel: Channel, free: NDArray[np.int64], load: F8, step: float, parts: int, driven: bool
+def _chain(a: F8, step: float) -> None:
+    """The last three unknowns are the bit force and what its derivatives are made of: p + r x + 4 b x (1 - x)."""
+    a[:, -3, -2], a[:, -2, -1] = 1.0 / step, -8.0 / step
+
+
+def _exact(square: F8, damping: F8, dense: bool, bit: F8, step: float) -> tuple[F8, F8, F8]:
+    """Exact step, half a step, and dissipation over the step, of (x, v, p, r, b).
+
+    Stacks (n, 5, 5) of single modes, or (1, 2n + 3, 2n + 3) if damping couples them.
+    """
+    n = len(square)
+    # unknowns (omega x, v, force ...): balanced, so that few doublings are needed; the force enters scaled, too
+    scale = np.sqrt(np.maximum(square, 1.0 / step**2))
+    if dense:
+        a, loss = np.zeros((1, 2 * n + 3, 2 * n + 3)), np.zeros((1, 2 * n + 3, 2 * n + 3))
+        i, j, size = np.arange(n), np.arange(n, 2 * n), np.abs(bit).max() * step
+        a[0, i, j], a[0, j, i], a[0, n : 2 * n, n : 2 * n] = scale, -square / scale, -damping
+        a[0, j, 2 * n] = -bit / size
+        loss[0, n : 2 * n, n : 2 * n] = damping
+        _chain(a, step)
+        (e, q), half = _step_matrices(a, loss, step), _step_matrices(a, loss, 0.5 * step)[0]
+        unscale: F8 = np.concatenate([scale, np.ones(n), [size, size, size]])[None]
+    else:
+        e, q, half = np.empty((3, n, 5, 5))
+        diagonal = np.diag(damping)
+        level = np.ceil(np.log2((scale + diagonal) * step))
+        for some in (level == one for one in np.unique(level)):
+            a, loss = np.zeros((some.sum(), 5, 5)), np.zeros((some.sum(), 5, 5))
+            a[:, 0, 1], a[:, 1, 0], a[:, 1, 1] = scale[some], -square[some] / scale[some], -diagonal[some]
+            a[:, 1, 2] = -1.0 / step
+            loss[:, 1, 1] = diagonal[some]
+            _chain(a, step)
+            e[some], q[some] = _step_matrices(a, loss, step)
+            half[some] = _step_matrices(a, loss, 0.5 * step)[0]
+        unscale = np.stack([scale, np.ones(n), bit * step, bit * step, bit * step], axis=1)
+    mix = np.eye(e.shape[-1])
+    mix[-2, -1] = 4.0
+    e, half = (x * unscale[:, None, :] / unscale[:, :, None] @ mix for x in (e, half))
+    q = mix.T @ (q * unscale[:, None, :] * unscale[:, :, None]) @ mix
+    return e, half, q
+
+
+def _classical(kind: str, square: F8, damping: F8, dense: bool, bit: F8, step: float) -> tuple[F8, F8, F8]:
+    """The same for the trapezoidal rule and for explicit central differences; half a step is left at zero."""
+    k, c = (np.diag(square)[None], damping[None]) if dense else (square[:, None, None], np.diag(damping)[:, None, None])
+    m, h, load = k.shape[-1], step, -(bit[None, :, None] if dense else bit[:, None, None])
+    one, none = np.broadcast_to(np.eye(m), k.shape), np.zeros_like(k)
+    if kind == "trapezoidal":
+        a = np.block([[none, one], [-k, -c]])
+        left = np.eye(2 * m) - 0.5 * h * a
+        e = np.linalg.solve(left, np.eye(2 * m) + 0.5 * h * a)
+        at_end = np.linalg.solve(left, np.concatenate([0.0 * load, 0.5 * h * load], axis=1))
+        at_start = at_end
+    else:
+        left = one + 0.5 * h * c
+        slow = one - 0.5 * h * c
+        e_x = np.concatenate([one - 0.5 * h * h * k, h * slow], axis=2)
+        e_v = np.concatenate([-0.5 * h * k, slow], axis=2) - 0.5 * h * k @ e_x
+        e = np.concatenate([e_x, np.linalg.solve(left, e_v)], axis=1)
+        x = 0.5 * h * h * load
+        at_start = np.concatenate([x, np.linalg.solve(left, 0.5 * h * (load - k @ x))], axis=1)
+        at_end = np.concatenate([0.0 * x, np.linalg.solve(left, 0.5 * h * load)], axis=1)
+    # bit force p at the start, p + r at the end
+    rows: F8 = np.concatenate([e, at_start + at_end, at_end, 0.0 * at_end], axis=2)
+    mean = 0.5 * rows[:, m:]
+    mean[:, np.arange(m), m + np.arange(m)] += 0.5
+    q = h * np.swapaxes(mean, 1, 2) @ c @ mean
+    full = np.zeros((len(rows), 2 * m + 3, 2 * m + 3))
+    full[:, : 2 * m] = rows
+    return full, np.zeros_like(full), q
+
+
+def condense(
+    channel: Channel,
+    free: NDArray[np.int64],
+    load: F8,
+    steps: tuple[float, ...],
+    driven: bool,
+    integrator: str = "exact",
 ) -> tuple[Modes, F8]:
-    """A channel over its free degrees of freedom for a step and its ``parts``-th, and the mode shapes (free, n)."""
+    """A channel over its free degrees of freedom for steps of all these lengths, and the mode shapes (free, n)."""
     part = np.ix_(free, free)
     mass = channel.mass[part]
     square, shapes = eigh(channel.stiffness[part], mass)
@@ -137,196 +236,319 @@ def _condense(
     damping = shapes.T @ channel.damping[part] @ shapes
     if not driven:
         damping[0, :] = damping[:, 0] = 0.0
-    diagonal = np.diag(damping).copy()
-    dense = bool(np.abs(damping - np.diag(diagonal)).max() > 1e-9 * max(diagonal.max(), 1e-300))
+    largest = np.diag(damping).max()
+    dense = bool(np.abs(damping - np.diag(np.diag(damping))).max() > 1e-9 * max(largest, 1e-300))
     hook = np.zeros(len(square)) if driven else shapes[list(free).index(channel.top)]
     momentum = channel.mass.sum(axis=0)
-    modes = (square, damping, dense, shapes[list(free).index(channel.bit)], shapes.T @ load[free], hook)
     uniform, inertia = shapes.T @ momentum[free], float(momentum.sum())
-    both = [_step_data(*modes, uniform, inertia, h, driven) for h in (step, step / parts)]
-    return Modes(*(np.stack(arrays) for arrays in zip(*both, strict=True))), shapes
-
-
-def _step_data(
-    square: F8,
-    damping: F8,
-    dense: bool,
-    bit: F8,
-    weight: F8,
-    hook: F8,
-    uniform: F8,
-    inertia: float,
-    step: float,
-    driven: bool,
-) -> tuple[F8, F8, F8]:
-    """Exact propagation of the modes over one step, and what is read from them."""
-    n = len(square)
-    diagonal = np.diag(damping)
-    # unknowns (omega x, v, p, r): balanced, so that few doublings are needed
-    scale = np.sqrt(np.maximum(square, 1.0 / step**2))
-    if dense:
-        a, loss = np.zeros((1, 2 * n + 2, 2 * n + 2)), np.zeros((1, 2 * n + 2, 2 * n + 2))
-        i, j = np.arange(n), np.arange(n, 2 * n)
-        a[0, i, j] = scale
-        a[0, j, i] = -square / scale
-        a[0, n : 2 * n, n : 2 * n] = -damping
-        a[0, j, 2 * n] = -bit
-        a[0, 2 * n, 2 * n + 1] = 1.0 / step
-        loss[0, n : 2 * n, n : 2 * n] = damping
-        # the force enters scaled, for the same reason
-        size = np.abs(bit).max() * step
-        a[0, j, 2 * n] /= size
-        es, qs = _step_matrices(a, loss, step)
-        e, q = es[0], qs[0]
-        unscale: F8 = np.concatenate([scale, np.ones(n), [size, size]])
-        e, q = e * unscale[None, :] / unscale[:, None], q * unscale[None, :] * unscale[:, None]
-        big = np.stack([e[: 2 * n, : 2 * n], q[: 2 * n, : 2 * n]])
-        e11 = e12 = e21 = e22 = qxx = qxv = qvv = np.zeros_like(square)
-        p, r = 2 * n, 2 * n + 1
-        cx, cv, rx, rv = e[:n, p], e[n : 2 * n, p], e[:n, r], e[n : 2 * n, r]
-        qxp, qvp, qxr, qvr = q[:n, p], q[n : 2 * n, p], q[:n, r], q[n : 2 * n, r]
-        qpp, qpr, qrr = q[p, p], 2 * q[p, r], q[r, r]
-    else:
-        es, qs = np.empty((n, 4, 4)), np.empty((n, 4, 4))
-        norms = (scale + diagonal) * step
-        for level in np.unique(np.ceil(np.log2(norms))):
-            some = np.ceil(np.log2(norms)) == level
-            a, loss = np.zeros((some.sum(), 4, 4)), np.zeros((some.sum(), 4, 4))
-            a[:, 0, 1], a[:, 1, 0], a[:, 1, 1] = scale[some], -square[some] / scale[some], -diagonal[some]
-            a[:, 1, 2], a[:, 2, 3] = -1.0 / step, 1.0 / step  # unit force, scaled by the step
-            loss[:, 1, 1] = diagonal[some]
-            es[some], qs[some] = _step_matrices(a, loss, step)
-        unscale = np.stack([scale, np.ones(n), bit * step, bit * step], axis=1)
-        e = es[:, :2] * unscale[:, None, :] / unscale[:, :2, None]
-        q = qs * unscale[:, None, :] * unscale[:, :, None]
-        big = np.zeros((2, 1, 1))
-        e11, e12, e21, e22 = e[:, 0, 0], e[:, 0, 1], e[:, 1, 0], e[:, 1, 1]
-        cx, cv, rx, rv = e[:, 0, 2], e[:, 1, 2], e[:, 0, 3], e[:, 1, 3]
-        qxx, qxv, qvv = q[:, 0, 0], 2 * q[:, 0, 1], q[:, 1, 1]
-        qxp, qvp, qxr, qvr = q[:, 0, 2], q[:, 1, 2], q[:, 0, 3], q[:, 1, 3]
-        qpp, qpr, qrr = q[:, 2, 2].sum(), 2 * q[:, 2, 3].sum(), q[:, 3, 3].sum()
+    bit, weight = shapes[list(free).index(channel.bit)], shapes.T @ load[free]
     mean = 0.0 if driven else weight[0] / bit[0]
     rest = np.where(square > 0, (weight - bit * mean) / np.where(square > 0, square, 1.0), 0.0)
-    still = np.zeros(n) if not driven else uniform / square
-    rows = [e11, e12, e21, e22, cx, cv, rx, rv, qxx, qxv, qvv, 2 * qxp, 2 * qvp, 2 * qxr, 2 * qvr]
-    rows += [bit, hook, square, rest, uniform, still, square * uniform, damping @ uniform, weight]
-    answers = [-bit @ cx, -bit @ cv, -bit @ rx, -bit @ rv]
-    return np.stack(rows), np.array([qpp, qpr, qrr, mean, *answers, inertia, uniform @ bit]), big
+    still = np.zeros(len(square)) if not driven else uniform / square
+    shape_rows = [bit, hook, square, rest, uniform, still, square * uniform, damping @ uniform, weight]
+
+    def data(step: float) -> tuple[F8, F8, F8]:
+        if integrator == "exact":
+            e, half, q = _exact(square, damping, dense, bit, step)
+        else:
+            e, half, q = _classical(integrator, square, damping, dense, bit, step)
+        m = (e.shape[-1] - 3) // 2
+        p, r, b = 2 * m, 2 * m + 1, 2 * m + 2
+        answers = [e[:, i : i + m, j].ravel() for j in (p, r, b) for i in (0, m)]
+        middle = [half[:, :m, j].ravel() for j in (p, r, b)]
+        mixed = [2 * q[:, i : i + m, j].ravel() for j in (p, r, b) for i in (0, m)]
+        if dense:
+            big = np.stack([e[0, :p, :p], q[0, :p, :p]])
+            own = [np.zeros_like(square)] * 4
+            loss = [np.zeros_like(square)] * 3
+            to_middle = [bit @ half[0, :m, :m], bit @ half[0, :m, m:p]]
+        else:
+            big = np.zeros((2, 1, 1))
+            own = [e[:, 0, 0], e[:, 0, 1], e[:, 1, 0], e[:, 1, 1]]
+            loss = [q[:, 0, 0], 2 * q[:, 0, 1], q[:, 1, 1]]
+            to_middle = [bit * half[:, 0, 0], bit * half[:, 0, 1]]
+        numbers = [
+            f * q[:, i, j].sum() for f, i, j in ((1, p, p), (2, p, r), (1, r, r), (2, p, b), (2, r, b), (1, b, b))
+        ]
+        numbers.append(mean)
+        for k in range(3):
+            numbers += [-bit @ answers[2 * k], -bit @ answers[2 * k + 1], -bit @ middle[k]]
+        exact = float(integrator == "exact")
+        numbers += [inertia, uniform @ bit, float(largest > 0.0), exact, exact / 12.0, 0.0, float(not square.any())]
+        return np.stack([*own, *answers, *loss, *mixed, *to_middle, *shape_rows]), np.array(numbers), big
+
+    return Modes(*(np.stack(arrays) for arrays in zip(*map(data, steps), strict=True))), shapes
 
 
-@kernel("reassoc", "contract", "nsz")
-def _propagate(
-    table: F8, big: F8, last: F8, x: F8, v: F8, p: float, r: float, x1: F8, v1: F8
-) -> tuple[float, float, float, float, float]:
+def _below(torsion: Channel) -> NDArray[np.int64]:
+    """Degrees of freedom below the top, whose angle is imposed."""
+    return np.flatnonzero(np.arange(len(torsion.mass)) != torsion.top)
+
+
+def _fastest(channel: Channel, free: NDArray[np.int64]) -> float:
+    """Highest natural frequency, rad/s."""
+    part, last = np.ix_(free, free), len(free) - 1
+    square = eigh(channel.stiffness[part], channel.mass[part], eigvals_only=True, subset_by_index=[last, last])
+    return float(np.sqrt(max(square[0], 0.0)))
+
+
+def stable_step(axial: Channel, torsion: Channel) -> float:
+    """Longest stable step (s) of explicit central differences: 2 / (highest natural frequency of the two, rad/s).
+
+    The axial top is free, the angle of the top is imposed.
+    """
+    return 2.0 / max(_fastest(axial, np.arange(len(axial.mass))), _fastest(torsion, _below(torsion)), 1e-300)
+
+
+@kernel("reassoc", "contract", "nsz", lean=True)
+def propagate(
+    table: F8, big: F8, damped: float, last: F8, x: F8, v: F8, p: float, r: float, b: float, x1: F8, v1: F8, z: F8
+) -> tuple[float, float, float, float, float, float, float]:
     """Add the bit force of the last step (rows ``last``), then advance freely by a step into x1, v1.
 
-    Returns bit position and speed without bit force, and the sums of the dissipation of the coming step:
-    loss = s0 + p s1 + r s2 + (terms in p, r).  State between calls: free part of the modes, force still to be added.
+    Returns the bit's position in the middle, and position and speed at the end, without bit force, and the sums of
+    the dissipation of the coming step: loss = s0 + p s1 + r s2 + b s3 + (terms in p, r, b).  State between calls: free
+    part of the modes, force still to be added.  ``z`` (4n): scratch.
     Only sums are reassociated (for SIMD); the order is fixed by the compiled code, so runs repeat to the bit.
     """
     n = table.shape[1]
-    u = w = s0 = s1 = s2 = 0.0
-    cx, cv, rx, rv, bit = last[CX], last[CV], last[RX], last[RV], table[BIT]
-    qxp, qvp, qxr, qvr = table[QXP], table[QVP], table[QXR], table[QVR]
+    m = u = w = s0 = s1 = s2 = s3 = 0.0
     if big.shape[1] > 1:
-        z = np.empty(2 * n)
+        step, loss = big[0], big[1]
         for j in range(n):
-            a = x[j] + (cx[j] * p + rx[j] * r)
-            b = v[j] + (cv[j] * p + rv[j] * r)
-            z[j] = a
-            z[n + j] = b
-            s1 += a * qxp[j] + b * qvp[j]
-            s2 += a * qxr[j] + b * qvr[j]
-        s0 = np.dot(z, np.dot(big[1], z))
-        z = np.dot(big[0], z)
+            f = x[j] + (last[CX, j] * p + last[RX, j] * r + last[BX, j] * b)
+            g = v[j] + (last[CV, j] * p + last[RV, j] * r + last[BV, j] * b)
+            z[j] = f
+            z[n + j] = g
+            m += table[MX, j] * f + table[MV, j] * g
+            s1 += f * table[QXP, j] + g * table[QVP, j]
+            s2 += f * table[QXR, j] + g * table[QVR, j]
+            s3 += f * table[QXB, j] + g * table[QVB, j]
+        for i in range(2 * n):
+            row, form = step[i], loss[i]
+            moved = lost = 0.0
+            for j in range(2 * n):
+                moved += row[j] * z[j]
+                lost += form[j] * z[j]
+            s0 += lost * z[i]
+            z[2 * n + i] = moved
         for j in range(n):
-            x1[j] = z[j]
-            v1[j] = z[n + j]
-            u += bit[j] * z[j]
-            w += bit[j] * z[n + j]
-        return u, w, s0, s1, s2
-    e11, e12, e21, e22 = table[E11], table[E12], table[E21], table[E22]
-    qxx, qxv, qvv = table[QXX], table[QXV], table[QVV]
+            x1[j] = z[2 * n + j]
+            v1[j] = z[3 * n + j]
+            u += table[BIT, j] * x1[j]
+            w += table[BIT, j] * v1[j]
+        return m, u, w, s0, s1, s2, s3
     for j in range(n):
-        a = x[j] + (cx[j] * p + rx[j] * r)
-        b = v[j] + (cv[j] * p + rv[j] * r)
-        s0 += a * (qxx[j] * a + qxv[j] * b) + qvv[j] * b * b
-        s1 += a * qxp[j] + b * qvp[j]
-        s2 += a * qxr[j] + b * qvr[j]
-        a1 = e11[j] * a + e12[j] * b
-        b1 = e21[j] * a + e22[j] * b
-        x1[j] = a1
-        v1[j] = b1
-        u += bit[j] * a1
-        w += bit[j] * b1
-    return u, w, s0, s1, s2
+        f = x[j] + (last[CX, j] * p + last[RX, j] * r + last[BX, j] * b)
+        g = v[j] + (last[CV, j] * p + last[RV, j] * r + last[BV, j] * b)
+        z[j] = f
+        z[n + j] = g
+        m += table[MX, j] * f + table[MV, j] * g
+        f1 = table[E11, j] * f + table[E12, j] * g
+        g1 = table[E21, j] * f + table[E22, j] * g
+        x1[j] = f1
+        v1[j] = g1
+        u += table[BIT, j] * f1
+        w += table[BIT, j] * g1
+    if damped > 0.0:
+        for j in range(n):
+            f, g = z[j], z[n + j]
+            s0 += f * (table[QXX, j] * f + table[QXV, j] * g) + table[QVV, j] * g * g
+            s1 += f * table[QXP, j] + g * table[QVP, j]
+            s2 += f * table[QXR, j] + g * table[QVR, j]
+            s3 += f * table[QXB, j] + g * table[QVB, j]
+    return m, u, w, s0, s1, s2, s3
 
 
-@kernel("reassoc", "contract", "nsz")
-def _observe(
-    table: F8, x: F8, v: F8, p: float, r: float, shift: float
+@kernel("reassoc", "contract", "nsz", lean=True)
+def observe(
+    table: F8, x: F8, v: F8, p: float, r: float, b: float, shift: float
 ) -> tuple[float, float, float, float, float, float, float]:
     """Sums over the modes: v.v, stored square, momentum, its position, restoring force, load position, top position.
 
     ``shift`` is the uniform acceleration of the frame, whose static answer is taken out of x.
     """
     kinetic = strain = momentum = position = force = load = top = 0.0
-    cx, cv, rx, rv, square, rest, still = (
-        table[CX],
-        table[CV],
-        table[RX],
-        table[RV],
-        table[SQUARE],
-        table[REST],
-        table[STILL],
-    )
-    uniform, pull, drag, load_row, hook = table[UNIFORM], table[PULL], table[DRAG], table[LOAD], table[HOOK]
     for j in range(table.shape[1]):
-        a = x[j] + (cx[j] * p + rx[j] * r)
-        b = v[j] + (cv[j] * p + rv[j] * r)
-        actual = a - still[j] * shift
-        whole = actual + rest[j]
-        kinetic += b * b
-        strain += square[j] * whole * whole
-        momentum += uniform[j] * b
-        position += uniform[j] * actual
-        force += pull[j] * a + drag[j] * b
-        load += load_row[j] * a
-        top += hook[j] * a
+        f = x[j] + (table[CX, j] * p + table[RX, j] * r + table[BX, j] * b)
+        g = v[j] + (table[CV, j] * p + table[RV, j] * r + table[BV, j] * b)
+        actual = f - table[STILL, j] * shift
+        whole = actual + table[REST, j]
+        kinetic += g * g
+        strain += table[SQUARE, j] * whole * whole
+        momentum += table[UNIFORM, j] * g
+        position += table[UNIFORM, j] * actual
+        force += table[PULL, j] * f + table[DRAG, j] * g
+        load += table[LOAD, j] * f
+        top += table[HOOK, j] * f
     return kinetic, strain, momentum, position, force, load, top
 
 
-# scalars of the state: what one step hands to the next
-(U, V, PHI, W, WC, WF, TC, TF, DEPTH, WEAR, CONTACT, PA, RA, PT, RT, ACC, TOP, TOP_SPEED, KIND, SWING) = range(20)
-(E_TOP, E_CUT, E_WEAR, E_LOSS, IMPULSE, MOMENTUM, DIVIDED, SOLVED) = range(20, 28)
-N_SCALARS = 28
+# Scalars of the state: what one step hands to the next.  (PA, RA, BA), (PT, RT, BT): the bit forces of the last step
+(U, V, PHI, W, WC, WF, TC, TF, DEPTH, WEAR, CONTACT) = range(11)
+(PA, RA, BA, PT, RT, BT, ACC, TOP, TOP_SPEED, KIND, SWING, SLOT) = range(11, 23)
+(E_TOP, E_CUT, E_WEAR, E_LOSS, IMPULSE, MOMENTUM, DIVIDED, SOLVED, RAMP) = range(23, 32)
+N_SCALARS = 32
+# of the solution of a step: cutting force at the end and its bulge, wear-flat force, their torques, bit speeds,
+# depth, turn, depth of cut, fraction of the wear-flat force, and by how much that force has grown in the step
+(N_WC, N_BULGE, N_WF, N_TC, N_TF, N_V, N_W, N_U, N_TURN, N_DEPTH, N_WEAR, N_GROWN) = range(12)
+N_FOUND = 12
+SCRATCH = 8
+"""Rows of scratch memory, each as long as the surface has sectors."""
 
 
-@kernel()
-def _cut_smoothly(
-    par: F8,
-    surface: SurfaceData,
-    axial: F8,
-    torsion: F8,
-    s: F8,
-    u_free: float,
-    v_free: float,
-    w_free: float,
-    turn_free: float,
-    work: F8,
-    out: F8,
+@kernel(lean=True)
+def _cut_on(par: F8, surface: SurfaceData, axial: F8, torsion: F8, s: F8, free: F8, work: F8, out: F8) -> bool:
+    """Step in which the bit cuts and the wear flats press all the time, or not at all: fourth order.
+
+    The cutting force is a parabola through its values now, in the middle and at the end of the step.  ``free`` (6,):
+    middle position, position and speed of the end without bit force, axial and torsional.  False, and nothing changed,
+    if it is not such a step.
+    """
+    m, blades, kappa = surface.share.size, par[BLADES], par[EPS1] * par[ZETA] * par[RADIUS]
+    ta, tf = 0.5 * par[RADIUS] / par[ZETA], 0.5 * par[RADIUS] * par[MU] * par[GAMMA]
+    wc0, wf = s[WC], s[WEAR] * par[SIGMA1] * par[RADIUS] * par[FLAT]
+    # answers to the force in the middle (first) and at the end, and what the rest of the parabola does
+    p, q = wc0 + wf - axial[MEAN], ta * wc0 + tf * wf
+    um1, um2 = axial[KM], axial[HM] - 0.5 * axial[KM]
+    ue1, ue2 = axial[KU], axial[HU] - 0.5 * axial[KU]
+    tm1, tm2 = ta * torsion[KM], ta * (torsion[HM] - 0.5 * torsion[KM])
+    te1, te2 = ta * torsion[KU], ta * (torsion[HU] - 0.5 * torsion[KU])
+    um = free[0] - axial[GM] * p + (axial[HM] + 0.5 * axial[KM]) * wc0
+    ue = free[1] - axial[GU] * p + (axial[HU] + 0.5 * axial[KU]) * wc0
+    tm = free[3] - torsion[GM] * q + (torsion[HM] + 0.5 * torsion[KM]) * ta * wc0
+    te = free[4] - torsion[GU] * q + (torsion[HU] + 0.5 * torsion[KU]) * ta * wc0
+    # the force goes on as it did
+    wm, we = wc0 + 0.5 * s[RAMP], wc0 + s[RAMP]
+    turn_m, turn = tm - tm1 * wm - tm2 * we, te - te1 * wm - te2 * we
+    for sweep in range(4):
+        if turn_m < 0.0 or turn < turn_m:
+            return False
+        guess_m, guess = turn_m, turn
+        ahead(surface, turn_m, True, work[0], work[1])
+        ahead(surface, turn, True, work[2], work[3])
+        high_m = high = slope_m = slope = 0.0
+        for i in range(m):
+            high_m += surface.share[i] * work[0, i]
+            slope_m += surface.share[i] * work[1, i]
+            high += surface.share[i] * work[2, i]
+            slope += surface.share[i] * work[3, i]
+        # the rock linearised there: two equations for the force in the middle and at the end
+        high_m += slope_m * (tm - guess_m)
+        high += slope * (te - guess)
+        a11 = 1.0 + kappa * (blades * um1 - slope_m * tm1)
+        a12 = kappa * (blades * um2 - slope_m * tm2)
+        a21 = kappa * (blades * ue1 - slope * te1)
+        a22 = 1.0 + kappa * (blades * ue2 - slope * te2)
+        b1, b2 = kappa * (blades * um - high_m), kappa * (blades * ue - high)
+        det = a11 * a22 - a12 * a21
+        if a11 <= 0.0 or det <= 0.0:
+            return False
+        wm, we = (a22 * b1 - a12 * b2) / det, (a11 * b2 - a21 * b1) / det
+        turn_m, turn = tm - tm1 * wm - tm2 * we, te - te1 * wm - te2 * we
+        if abs(turn - guess) + abs(turn_m - guess_m) <= 1e-6 * abs(turn):
+            break
+        if sweep == 3:  # the rock is too rough for parabolas
+            return False
+    bulge = wm - 0.5 * (wc0 + we)
+    v = free[2] - axial[GV] * p - axial[HV] * (we - wc0) - axial[KV] * bulge
+    w = free[5] - torsion[GV] * q - ta * (torsion[HV] * (we - wc0) + torsion[KV] * bulge)
+    if w < max(par[C2], par[C3]) or w <= 0.0 or (v < par[C1] if wf > 0.0 else v > 0.0):
+        return False
+    u_m, u = um - um1 * wm - um2 * we, ue - ue1 * wm - ue2 * we
+    for i in range(m):
+        if u_m < work[0, i] + work[1, i] * (turn_m - guess_m) or u < work[2, i] + work[3, i] * (turn - guess):
+            return False
+    out[N_WC], out[N_BULGE], out[N_WF], out[N_TC], out[N_TF] = we, bulge, wf, ta * we, tf * wf
+    out[N_V], out[N_W], out[N_U], out[N_TURN], out[N_DEPTH], out[N_WEAR] = v, w, u, turn, we / kappa, s[WEAR]
+    out[N_GROWN] = 0.0
+    return True
+
+
+@kernel(lean=True)
+def _stick_on(
+    par: F8, surface: SurfaceData, axial: F8, torsion: F8, s: F8, free: F8, step: float, work: F8, out: F8
 ) -> bool:
-    """Step with the cutting force linear in time: closed form.  False, and nothing changed, if it is not cutting."""
+    """Step in which a rigid mass on the bit sticks axially while the bit turns and cuts: as `_cut_on`, and the
+    wear-flat force is linear in the step and holds the mass in its middle and at its end.
+
+    Linear from one step to the next it would ring; so it may jump between steps (second order).  False, and nothing
+    changed, if the mass comes loose.
+    """
+    m, kappa = surface.share.size, par[EPS1] * par[ZETA] * par[RADIUS]
+    ta, tf = 0.5 * par[RADIUS] / par[ZETA], 0.5 * par[RADIUS] * par[MU] * par[GAMMA]
+    flat, wc0 = par[SIGMA1] * par[RADIUS] * par[FLAT], s[WC]
+    if flat <= 0.0:
+        return False
+    soft, push = par[C1] / flat, axial[GV]  # speed per force of the law and of the mass over the step
+    wm, we, wear_m, wear = wc0 + 0.5 * s[RAMP], wc0 + s[RAMP], s[WF], s[WF]
+    u_m = u = s[U]
+    turn_m = turn = start = grown = bulge = 0.0
+    for sweep in range(8):
+        bulge = wm - 0.5 * (wc0 + we)
+        # 2 x 2: the speeds that the law gives to the wear forces in the middle and at the end
+        b1 = free[2] - push * (0.5 * (wc0 - axial[MEAN]) + (we - wc0) / 8.0 + bulge / 3.0)
+        b2 = free[2] - push * (wc0 - axial[MEAN] + 0.5 * (we - wc0) + bulge / 1.5)
+        # force 2 wear_m - wear at the start
+        a11, a12 = soft + 0.75 * push, -0.25 * push
+        a21, a22 = push, soft
+        det = a11 * a22 - a12 * a21
+        wear_m, wear = (a22 * b1 - a12 * b2) / det, (a11 * b2 - a21 * b1) / det
+        start, grown = 2.0 * wear_m - wear, 2.0 * (wear - wear_m)
+        p, q, r = wc0 + start - axial[MEAN], ta * wc0 + tf * start, we - wc0
+        old_m, old = turn_m, turn
+        turn_m = free[3] - torsion[GM] * q - torsion[HM] * (ta * r + tf * grown) - torsion[KM] * ta * bulge
+        turn = free[4] - torsion[GU] * q - torsion[HU] * (ta * r + tf * grown) - torsion[KU] * ta * bulge
+        u_m = free[0] - axial[GM] * p - axial[HM] * (r + grown) - axial[KM] * bulge
+        u = free[1] - axial[GU] * p - axial[HU] * (r + grown) - axial[KU] * bulge
+        if turn_m < 0.0 or turn < turn_m:
+            return False
+        ahead(surface, turn_m, True, work[0], work[1])
+        ahead(surface, turn, True, work[2], work[3])
+        wm = we = 0.0
+        for i in range(m):
+            if u_m < work[0, i] or u < work[2, i]:
+                return False
+            wm += kappa * surface.share[i] * (u_m - work[0, i])
+            we += kappa * surface.share[i] * (u - work[2, i])
+        if abs(turn - old) + abs(turn_m - old_m) <= 1e-9 * abs(turn):
+            break
+        if sweep == 7:
+            return False
+    w = free[5] - torsion[GV] * q - torsion[HV] * (ta * r + tf * grown) - torsion[KV] * ta * bulge
+    if w < max(par[C2], par[C3]) or w <= 0.0:
+        return False
+    if min(wear_m, wear) < 0.0 or max(wear_m, wear) > flat:
+        return False
+    out[N_WC], out[N_BULGE], out[N_WF], out[N_TC], out[N_TF] = we, bulge, wear, ta * we, tf * wear
+    out[N_V], out[N_W], out[N_U], out[N_TURN], out[N_DEPTH], out[N_WEAR] = (
+        soft * wear,
+        w,
+        u,
+        turn,
+        we / kappa,
+        wear / flat,
+    )
+    out[N_GROWN] = grown
+    return True
+
+
+@kernel(lean=True)
+def _cut_smoothly(par: F8, surface: SurfaceData, axial: F8, torsion: F8, s: F8, free: F8, work: F8, out: F8) -> bool:
+    """Step with the cutting force linear in time and any wear-flat force: closed form, second order.
+
+    ``free`` as for `_cut_on`.  False, and nothing changed, if it is not cutting.
+    """
     m = surface.share.size
     ta, tf = 0.5 * par[RADIUS] / par[ZETA], 0.5 * par[RADIUS] * par[MU] * par[GAMMA]
     kappa = par[EPS1] * par[ZETA] * par[RADIUS]
     flat = par[SIGMA1] * par[RADIUS] * par[FLAT]
     wc0, tc0 = s[WC], s[TC]
     # end values as affine maps of the end cutting force wc and the wear force wf
-    ua = u_free - axial[GU] * (wc0 - axial[MEAN]) + axial[HU] * wc0
-    va = v_free - axial[GV] * (wc0 - axial[MEAN]) + axial[HV] * wc0
-    fa = turn_free - torsion[GU] * tc0 + torsion[HU] * tc0
-    wa = w_free - torsion[GV] * tc0 + torsion[HV] * tc0
+    ua = free[1] - axial[GU] * (wc0 - axial[MEAN]) + axial[HU] * wc0
+    va = free[2] - axial[GV] * (wc0 - axial[MEAN]) + axial[HV] * wc0
+    fa = free[4] - torsion[GU] * tc0 + torsion[HU] * tc0
+    wa = free[5] - torsion[GV] * tc0 + torsion[HV] * tc0
     turn = fa - torsion[HU] * tc0 - torsion[GU] * s[TF]
     wc = wf = u = v = w = x = 0.0
     for _sweep in range(4):
@@ -362,106 +584,94 @@ def _cut_smoothly(
         if u < work[0, i]:
             return False
         depth += surface.share[i] * (u - work[0, i])
-    out[0], out[1], out[2], out[3], out[4], out[5] = wc, wf, ta * wc, tf * wf, v, w
-    out[6], out[7], out[8], out[9] = u, turn, depth, x
+    if abs(wc - kappa * depth) > 1e-6 * (abs(wc) + flat):  # over a step in the rock
+        return False
+    out[N_WC], out[N_BULGE], out[N_WF], out[N_TC], out[N_TF] = wc, 0.0, wf, ta * wc, tf * wf
+    out[N_V], out[N_W], out[N_U], out[N_TURN], out[N_DEPTH], out[N_WEAR] = v, w, u, turn, depth, x
+    out[N_GROWN] = 0.0
     return True
 
 
-@kernel()
-def _substep(
+@kernel(lean=True)
+def end_of_step(
     par: F8,
     surface: SurfaceData,
-    axial: Modes,
-    torsion: Modes,
-    kind: int,
-    modes: F8,
-    spare: F8,
+    axial: F8,
+    torsion: F8,
+    whole: bool,
     s: F8,
     step: float,
-    angle1: float,
-    speed1: float,
+    free: F8,
+    turned: float,
     work: F8,
     out: F8,
 ) -> bool:
-    """One step of one kind (0 whole, 1 part).  A whole step must be smooth: else False, and nothing has changed."""
-    ca, ct = axial.number[kind], torsion.number[kind]
-    last = int(s[KIND])
-    acceleration = s[ACC]
-    uf, vf, a0, a1, a2 = _propagate(
-        axial.table[kind], axial.big[kind], axial.table[last], modes[0], modes[1], s[PA], s[RA], spare[0], spare[1]
-    )
-    yf, wf_, t0, t1, t2 = _propagate(
-        torsion.table[kind],
-        torsion.big[kind],
-        torsion.table[last],
-        modes[2],
-        modes[3],
-        s[PT],
-        s[RT],
-        spare[2],
-        spare[3],
-    )
-    wf_ += speed1
-    turned = angle1 - s[TOP]
-    turn_free = yf - s[SWING] * acceleration - s[PHI] + turned
+    """Solve the bit, turn the rock and keep the books of one step; the bit forces of the step are left in ``s``.
 
-    smooth = s[CONTACT] > 0.0 and _cut_smoothly(par, surface, ca, ct, s, uf, vf, wf_, turn_free, work, out)
-    if kind == 0 and not (smooth and out[9] == s[WEAR]):
+    axial, torsion : Modes.number of the step.  free (6,) : as for `_cut_on`, turns from the committed angle.
+    turned : rad, by which the top turned.  A ``whole`` step must be smooth: else False, and nothing has changed.
+    """
+    steady = s[WEAR] == 0.0 or s[WEAR] == 1.0
+    smooth = False
+    if s[CONTACT] > 0.0 and axial[FOURTH] > 0.0:
+        if steady:
+            smooth = _cut_on(par, surface, axial, torsion, s, free, work, out)
+        elif axial[RIGID] > 0.0:
+            smooth = _stick_on(par, surface, axial, torsion, s, free, step, work, out)
+    if not smooth and whole and (axial[FOURTH] > 0.0 or not steady):
         return False
-    momentum0 = position0 = 0.0
-    if acceleration != 0.0:
-        obs = _observe(torsion.table[last], modes[2], modes[3], s[PT], s[RT], acceleration)
-        momentum0, position0 = obs[2] + ct[INERTIA] * s[TOP_SPEED], obs[3]
-    modes[:] = spare
+    if not smooth and s[CONTACT] > 0.0:
+        smooth = _cut_smoothly(par, surface, axial, torsion, s, free, work, out)
+        if whole and not (smooth and out[N_WEAR] == s[WEAR]):
+            return False
+    if not smooth and whole:
+        return False
+    ta, tf = 0.5 * par[RADIUS] / par[ZETA], 0.5 * par[RADIUS] * par[MU] * par[GAMMA]
+    w0, bulge, grown = s[W], 0.0, 0.0
     if smooth:
-        wc, wf, tc, tf, v, w = out[0], out[1], out[2], out[3], out[4], out[5]
-        u, turn, depth, wear = out[6], out[7], out[8], out[9]
-        pc, rc, qc, zc = s[WC], wc - s[WC], s[TC], tc - s[TC]
-        # the path of the bit in the rock is smooth too
-        commit(surface, turn, s[U], u, s[V] / s[W], v / w)
+        wc, wf, tc, tf1, v, w = out[N_WC], out[N_WF], out[N_TC], out[N_TF], out[N_V], out[N_W]
+        u, turn, depth, wear, bulge, grown = (
+            out[N_U], out[N_TURN], out[N_DEPTH], out[N_WEAR], out[N_BULGE], out[N_GROWN]
+        )  # fmt: skip
+        pc, rc, qc, zc, pw, qw = s[WC], wc - s[WC], s[TC], tc - s[TC], wf - grown, tf1 - tf * grown
+        # spin at the start: where the string has no inertia it follows the torque at once
+        if torsion[AT_ONCE] > 0.0:
+            w0 = free[6] - torsion[AT_ONCE] * (qc + qw)
+        if turn > 0.0 and min(w0, w) > 0.2 * turn / step:  # the path of the bit in the rock is smooth too
+            commit(surface, turn, s[U], u, s[V] / w0, v / w)
+        else:
+            chord = (u - s[U]) / turn if turn != 0.0 else 0.0
+            commit(surface, turn, s[U], u, chord, chord)
     else:
-        wc, wf, tc, tf, v, w, u, turn, depth = bit_step(
+        wc, wf, tc, tf1, v, w, u, turn, depth = bit_step_in(
             par,
             surface,
-            vf + ca[GV] * ca[MEAN],
-            ca[GV],
-            uf + ca[GU] * ca[MEAN],
-            ca[GU],
-            wf_,
-            ct[GV],
-            turn_free,
-            ct[GU] / ct[GV],
+            free[2] + axial[GV] * axial[MEAN],
+            axial[GV],
+            free[1] + axial[GU] * axial[MEAN],
+            axial[GU],
+            free[5],
+            torsion[GV],
+            free[4],
+            torsion[GU] / torsion[GV],
             s[W],
+            work,
         )[2:]
         wear = wear_fraction(par, v)
-        pc, rc, qc, zc = wc, 0.0, tc, 0.0
+        pc, rc, qc, zc, pw, qw = wc, 0.0, tc, 0.0, wf, tf1
         s[SOLVED] += 1.0
         chord = (u - s[U]) / turn if turn != 0.0 else 0.0
         commit(surface, turn, s[U], u, chord, chord)
-    # work of the bit force: exact for its constant part, fourth order for its linear part
-    s[E_CUT] += pc * (u - s[U]) + rc * (0.5 * (u - s[U]) + step / 12.0 * (v - s[V]))
-    s[E_CUT] += qc * turn + zc * (0.5 * turn + step / 12.0 * (w - s[W]))
-    s[E_WEAR] += wf * (u - s[U]) + tf * turn
-    p, r = pc + wf - ca[MEAN], rc
-    s[E_LOSS] += a0 + p * a1 + r * a2 + ca[QPP] * p * p + ca[QPR] * p * r + ca[QRR] * r * r
-    s[PA], s[RA] = p, r
-    p, r = qc + tf, zc
-    s[E_LOSS] += t0 + p * t1 + r * t2 + ct[QPP] * p * p + ct[QPR] * p * r + ct[QRR] * r * r
-    s[PT], s[RT] = p, r
-    # top drive: its torque is the bit's plus the change of angular momentum
-    if acceleration == 0.0:
-        s[IMPULSE] += (p + 0.5 * r) * step
-    else:
-        obs = _observe(torsion.table[kind], modes[2], modes[3], p, r, acceleration)
-        speed0 = s[TOP_SPEED]
-        s[E_TOP] += (obs[2] + ct[INERTIA] * speed1) * speed1 - momentum0 * speed0
-        s[E_TOP] -= acceleration * (obs[3] - position0 + ct[INERTIA] * turned)
-        s[E_TOP] += step * (p * 0.5 * (speed0 + speed1) + r * (speed0 / 6.0 + speed1 / 3.0))
+    # work of the bit force: exact for its constant part, fourth order for the others
+    sink, rise, spun = u - s[U], step * axial[TWELFTH] * (v - s[V]), step * torsion[TWELFTH] * (w - w0)
+    s[E_CUT] += pc * sink + rc * (0.5 * sink + rise) + bulge * (0.8 * sink - step / 15.0 * (v + s[V]))
+    s[E_CUT] += qc * turn + zc * (0.5 * turn + spun) + ta * bulge * (0.8 * turn - step / 15.0 * (w + w0))
+    s[E_WEAR] += pw * sink + qw * turn + grown * (0.5 * sink + rise + tf * (0.5 * turn + spun))
+    s[PA], s[RA], s[BA] = pc + pw - axial[MEAN], rc + grown, bulge
+    s[PT], s[RT], s[BT], s[RAMP] = qc + qw, zc + tf * grown, ta * bulge, rc
     s[U], s[V], s[W] = u, v, w
     s[PHI] = s[PHI] - turned + turn
-    s[WC], s[WF], s[TC], s[TF], s[DEPTH], s[WEAR] = wc, wf, tc, tf, depth, wear
-    s[TOP], s[TOP_SPEED] = angle1, speed1
-    s[KIND] = kind
+    s[WC], s[WF], s[TC], s[TF], s[DEPTH], s[WEAR] = wc, wf, tc, tf1, depth, wear
     contact = w >= max(par[C2], par[C3]) and w > 0.0 and depth >= 0.0
     if contact and not smooth:
         ahead(surface, 0.0, True, work[0], work[1])
@@ -471,7 +681,68 @@ def _substep(
     return True
 
 
-@kernel()
+@kernel(lean=True)
+def _substep(
+    par: F8,
+    surface: SurfaceData,
+    axial: Modes,
+    torsion: Modes,
+    kind: int,
+    modes: F8,
+    s: F8,
+    step: float,
+    angle1: float,
+    speed1: float,
+    work: F8,
+    small: F8,
+    z: F8,
+) -> bool:
+    """One step of one kind (0 whole, else a part).  A whole step must be smooth: else False, and nothing changes."""
+    ca, ct = axial.number[kind], torsion.number[kind]
+    if kind == 0 and (s[CONTACT] == 0.0 or (0.0 < s[WEAR] < 1.0 and ca[RIGID] == 0.0)):
+        return False
+    last, slot, acceleration = int(s[KIND]), int(s[SLOT]), s[ACC]
+    old, new, free, out = modes[slot], modes[1 - slot], small[0], small[1]
+    free[0], free[1], free[2], a0, a1, a2, a3 = propagate(
+        axial.table[kind], axial.big[kind], ca[DAMPED], axial.table[last],
+        old[0], old[1], s[PA], s[RA], s[BA], new[0], new[1], z,
+    )  # fmt: skip
+    free[3], free[4], free[5], t0, t1, t2, t3 = propagate(
+        torsion.table[kind], torsion.big[kind], ct[DAMPED], torsion.table[last],
+        old[2], old[3], s[PT], s[RT], s[BT], new[2], new[3], z,
+    )  # fmt: skip
+    turned, speed0 = angle1 - s[TOP], s[TOP_SPEED]
+    shift = s[SWING] * acceleration + s[PHI]
+    # half-way the top has turned as a uniform acceleration has it
+    free[3] += 0.5 * turned - 0.125 * acceleration * step * step - shift
+    free[4] += turned - shift
+    free[5] += speed1
+    momentum0 = position0 = 0.0
+    if acceleration != 0.0:
+        obs = observe(torsion.table[last], old[2], old[3], s[PT], s[RT], s[BT], acceleration)
+        momentum0, position0 = obs[2] + ct[INERTIA] * speed0, obs[3]
+    if not end_of_step(par, surface, ca, ct, kind == 0, s, step, free, turned, work, out):
+        return False
+    s[SLOT], s[KIND] = 1 - slot, kind
+    p, r, b = s[PA], s[RA], s[BA]
+    s[E_LOSS] += a0 + p * a1 + r * a2 + b * a3
+    s[E_LOSS] += p * (ca[QPP] * p + ca[QPR] * r + ca[QPB] * b) + r * (ca[QRR] * r + ca[QRB] * b) + ca[QBB] * b * b
+    p, r, b = s[PT], s[RT], s[BT]
+    s[E_LOSS] += t0 + p * t1 + r * t2 + b * t3
+    s[E_LOSS] += p * (ct[QPP] * p + ct[QPR] * r + ct[QPB] * b) + r * (ct[QRR] * r + ct[QRB] * b) + ct[QBB] * b * b
+    # top drive: its torque is the bit's plus the change of angular momentum
+    if acceleration == 0.0:
+        s[IMPULSE] += (p + 0.5 * r + b / 1.5) * step
+    else:
+        obs = observe(torsion.table[kind], new[2], new[3], p, r, b, acceleration)
+        s[E_TOP] += (obs[2] + ct[INERTIA] * speed1) * speed1 - momentum0 * speed0
+        s[E_TOP] -= acceleration * (obs[3] - position0 + ct[INERTIA] * turned)
+        s[E_TOP] += step * ((0.5 * p + b / 3.0) * (speed0 + speed1) + r * (speed0 / 6.0 + speed1 / 3.0))
+    s[TOP], s[TOP_SPEED] = angle1, speed1
+    return True
+
+
+@kernel(lean=True)
 def _march(
     par: F8,
     surface: SurfaceData,
@@ -481,14 +752,19 @@ def _march(
     s: F8,
     first: int,
     step: float,
-    parts: int,
+    divisions: NDArray[np.int64],
     top: F8,
     hook_load: float,
     every: int,
     rows: F8,
+    work: F8,
+    small: F8,
+    z: F8,
 ) -> None:
-    """Steps after number ``first``, as many as ``top`` (steps + 1, 2: angle, speed) has; a row each ``every`` steps."""
-    work, out, spare = np.empty((2, surface.share.size)), np.empty(10), np.empty_like(modes)
+    """Steps after number ``first``, as many as ``top`` (steps + 1, 2: angle, speed) has; a row each ``every`` steps.
+
+    work (SCRATCH, sectors), small (2, N_FOUND), z (4 modes): scratch.
+    """
     written = 0
     for k in range(top.shape[0] - 1):
         angle1, speed1 = top[k + 1, 0], top[k + 1, 1]
@@ -496,22 +772,22 @@ def _march(
         if abs(acceleration) * step <= 1e-14 * abs(speed1):
             acceleration = 0.0
         if acceleration != s[ACC]:
-            table = torsion.table[int(s[KIND])]
-            momentum = _observe(table, modes[2], modes[3], s[PT], s[RT], s[ACC])[2]
+            table, now = torsion.table[int(s[KIND])], modes[int(s[SLOT])]
+            momentum = observe(table, now[2], now[3], s[PT], s[RT], s[BT], s[ACC])[2]
             momentum += torsion.number[0, INERTIA] * s[TOP_SPEED]
             if s[ACC] == 0.0:  # close the account of the uniform motion
                 s[E_TOP] += s[TOP_SPEED] * (s[IMPULSE] + momentum - s[MOMENTUM])
                 s[IMPULSE] = 0.0
             s[MOMENTUM] = momentum
             # the frame turns with the top: the static answer to its acceleration is kept out of the modes
-            modes[2, : table.shape[1]] += table[STILL] * (acceleration - s[ACC])
+            for j in range(table.shape[1]):
+                now[2, j] += table[STILL, j] * (acceleration - s[ACC])
             s[ACC] = acceleration
-        steady = s[CONTACT] > 0.0 and (s[WEAR] == 0.0 or s[WEAR] == 1.0)
-        if not steady or not _substep(
-            par, surface, axial, torsion, 0, modes, spare, s, step, angle1, speed1, work, out
-        ):
+        if not _substep(par, surface, axial, torsion, 0, modes, s, step, angle1, speed1, work, small, z):
             angle0, speed0 = s[TOP], s[TOP_SPEED]
             s[DIVIDED] += 1.0
+            kind = 1 if s[CONTACT] > 0.0 else 2
+            parts = divisions[kind]
             for part in range(1, parts + 1):
                 f = part / parts
                 # the angle of a uniformly accelerated top that ends where it should
@@ -519,13 +795,13 @@ def _march(
                 speed = speed0 + f * (speed1 - speed0)
                 if part == parts:
                     angle, speed = angle1, speed1
-                _substep(par, surface, axial, torsion, 1, modes, spare, s, step / parts, angle, speed, work, out)
+                _substep(par, surface, axial, torsion, kind, modes, s, step / parts, angle, speed, work, small, z)
         if (first + k + 1) % every == 0:
             _row(par, surface, axial, torsion, modes, s, (first + k + 1) * step, hook_load, rows[written])
             written += 1
 
 
-@kernel()
+@kernel(lean=True)
 def _row(
     par: F8,
     surface: SurfaceData,
@@ -538,10 +814,10 @@ def _row(
     row: F8,
 ) -> None:
     """Fill one row of OUTPUTS; the works of the loads have offsets that the caller takes off."""
-    kind = int(s[KIND])
+    kind, now = int(s[KIND]), modes[int(s[SLOT])]
     ct = torsion.number[kind]
-    a = _observe(axial.table[kind], modes[0], modes[1], s[PA], s[RA], 0.0)
-    t = _observe(torsion.table[kind], modes[2], modes[3], s[PT], s[RT], s[ACC])
+    a = observe(axial.table[kind], now[0], now[1], s[PA], s[RA], s[BA], 0.0)
+    t = observe(torsion.table[kind], now[2], now[3], s[PT], s[RT], s[BT], s[ACC])
     torque, speed = s[TC] + s[TF], s[TOP_SPEED]
     top_torque = torque * (1.0 - ct[REACH]) + ct[INERTIA] * s[ACC] - t[4]
     row[0], row[1], row[2], row[3], row[4] = time, s[W], s[V], s[TOP] + s[PHI], s[U]
@@ -558,13 +834,6 @@ def _row(
     row[20] = 0.5 * par[RADIUS] * par[RADIUS] * surface.removed[0]
 
 
-def _fastest(channel: Channel, free: NDArray[np.int64]) -> float:
-    """Highest natural frequency, rad/s."""
-    part, last = np.ix_(free, free), len(free) - 1
-    square = eigh(channel.stiffness[part], channel.mass[part], eigvals_only=True, subset_by_index=[last, last])
-    return float(np.sqrt(square[0]))
-
-
 class CondensedString:
     """Axial-torsional string on a cutting bit, marched with a fixed step.
 
@@ -575,7 +844,12 @@ class CondensedString:
     step : s.
     hook_load : N.
     top : rad/s, or a function of an array of times that returns the arrays (angle, speed).
-    parts : division of a step that is not smooth; default: so that the fastest mode turns at most 2 rad in a part.
+    parts : divisions of a step that is not smooth: where the turning bit begins or ceases to stick or stalls, and
+        where it starts stalled, backwards or off bottom.  Default: so that the fastest mode turns at most 2 rad in a
+        part, and at least LEAST_PARTS and ROUGH_PARTS.
+    integrator : "exact" (each mode by its exact solution), "trapezoidal" or "explicit" (central differences).
+
+    Raises ValueError for a step that is not positive, or beyond the stability limit of "explicit" (`stable_step`).
     """
 
     def __init__(
@@ -588,22 +862,34 @@ class CondensedString:
         *,
         hook_load: float,
         top: float | TopMotion,
-        parts: int | None = None,
+        parts: int | tuple[int, int] | None = None,
+        integrator: str = "exact",
     ) -> None:
         if not step > 0:
             raise ValueError(f"condensed string: step = {step}: must be > 0")
+        if integrator not in INTEGRATORS:
+            raise ValueError(f"condensed string: integrator = {integrator!r}: must be one of {', '.join(INTEGRATORS)}")
+        limit = stable_step(axial, torsion)
+        if integrator == "explicit" and step > limit:
+            raise ValueError(
+                f"condensed string: step = {step:g} s: explicit central differences are stable up to {limit:.4g} s"
+            )
         self.axial, self.torsion, self.law, self.surface = axial, torsion, law, surface
-        self.step, self.hook_load = float(step), float(hook_load)
+        self.step, self.hook_load, self.integrator = float(step), float(hook_load), integrator
         self._top: TopMotion = top if callable(top) else lambda t: (top * t, np.full_like(t, top))
         n = len(axial.mass)
         load = np.zeros(n) if axial.load is None else np.array(axial.load, float)
         load[axial.top] -= hook_load
-        self._free = np.flatnonzero(np.arange(len(torsion.mass)) != torsion.top)
-        fastest = max(_fastest(axial, np.arange(n)), _fastest(torsion, self._free))
-        self.parts = max(1, int(np.ceil(0.5 * fastest * step))) if parts is None else parts
-        self._axial, self._axial_shapes = _condense(axial, np.arange(n), load, self.step, self.parts, driven=False)
-        self._torsion, self._torsion_shapes = _condense(
-            torsion, self._free, np.zeros(len(torsion.mass)), self.step, self.parts, driven=True
+        self._free = _below(torsion)
+        if parts is None:
+            resolved = int(np.ceil(step / limit))
+            parts = max(LEAST_PARTS[n == 1], resolved), max(ROUGH_PARTS[n == 1], resolved)
+        self.parts = parts if isinstance(parts, tuple) else (parts, parts)
+        self._divisions = np.array([1, *self.parts])
+        steps = tuple(self.step / self._divisions)
+        self._axial, self._axial_shapes = condense(axial, np.arange(n), load, steps, False, integrator)
+        self._torsion, self._torsion_shapes = condense(
+            torsion, self._free, np.zeros(len(torsion.mass)), steps, True, integrator
         )
         self._par = law.array
         self.count = 0
@@ -639,21 +925,15 @@ class CondensedString:
         # the uniform part of the displacement is set so that the bit starts at depth 0
         self._origin = float(a[BIT] @ xa)
         xa[0] -= self._origin / a[BIT][0]
-        # rows: axial position and speed, torsional position and speed
-        self._modes = np.zeros((4, max(len(xa), len(xt))))
-        for row, values in zip(self._modes, (xa, va, xt, vt), strict=True):
+        # two copies, the current one at s[SLOT]; rows: axial position and speed, torsional position and speed
+        self._modes = np.zeros((2, 4, max(len(xa), len(xt))))
+        for row, values in zip(self._modes[0], (xa, va, xt, vt), strict=True):
             row[: len(values)] = values
         s = self._s = np.zeros(N_SCALARS)
         s[TOP], s[TOP_SPEED] = angle, speed
         s[V], s[PHI], s[W] = a[BIT] @ va, t[BIT] @ xt, speed + t[BIT] @ vt
         s[MOMENTUM], s[SWING] = t[UNIFORM] @ vt + self._torsion.number[0, INERTIA] * speed, t[BIT] @ t[STILL]
-        s[WEAR] = wear_fraction(self._par, s[V])
-        gap = -self.surface.ahead(0.0)[0]
-        share = self.surface.data.share
-        s[DEPTH] = self.surface.depth_of_cut(0.0)
-        contact = share @ (gap >= 0) / share.sum()
-        s[WC : TF + 1] = law_forces(self._par, s[V], s[W], s[DEPTH], contact)[2:]
-        s[CONTACT] = float(contact == 1.0 and s[W] > 0 and s[W] >= max(self._par[C2], self._par[C3]))
+        start_bit(s, self._par, self.surface)
         self.count = 0
         self._offset = np.zeros(len(OUTPUTS))
         self._offset[[15, 16]] = [self.sample()[name] for name in OUTPUTS[15:17]]
@@ -679,11 +959,14 @@ class CondensedString:
             self._s,
             self.count,
             self.step,
-            self.parts,
+            self._divisions,
             top,
             self.hook_load,
             every,
             rows,
+            np.empty((SCRATCH, len(self.surface.data.share))),
+            np.empty((2, N_FOUND)),
+            np.empty(4 * self._modes.shape[2]),
         )
         self.count += steps
         rows -= self._offset
@@ -693,11 +976,13 @@ class CondensedString:
         """Nodal displacement (m), angle (rad) and their speeds now, in the numbering of the channels."""
         s, kind = self._s, int(self._s[KIND])
         a, t = self._axial.table[kind], self._torsion.table[kind]
-        x, v = self._modes[:2, : a.shape[1]]
-        y, w = self._modes[2:, : t.shape[1]]
-        xa, va = x + a[CX] * s[PA] + a[RX] * s[RA] + a[REST], v + a[CV] * s[PA] + a[RV] * s[RA]
-        xt = y + t[CX] * s[PT] + t[RX] * s[RT] - t[STILL] * s[ACC]
-        vt = w + t[CV] * s[PT] + t[RV] * s[RT]
+        now = self._modes[int(s[SLOT])]
+        x, v = now[:2, : a.shape[1]]
+        y, w = now[2:, : t.shape[1]]
+        xa = x + a[[CX, RX, BX]].T @ s[PA : BA + 1] + a[REST]
+        va = v + a[[CV, RV, BV]].T @ s[PA : BA + 1]
+        xt = y + t[[CX, RX, BX]].T @ s[PT : BT + 1] - t[STILL] * s[ACC]
+        vt = w + t[[CV, RV, BV]].T @ s[PT : BT + 1]
         angle, spin = np.full(len(self.torsion.mass), s[TOP]), np.full(len(self.torsion.mass), s[TOP_SPEED])
         angle[self._free] += self._torsion_shapes @ xt
         spin[self._free] += self._torsion_shapes @ vt
@@ -724,6 +1009,16 @@ class CondensedString:
         self._modes[:], self._s[:], self._offset[:] = state["modes"], state["scalars"], state["offset"]
         self.count, self._origin = int(state["count"]), float(state["origin"])
         self.surface.load({name[8:]: array for name, array in state.items() if name.startswith("surface_")})
+
+
+def start_bit(s: F8, par: F8, surface: RockSurface) -> None:
+    """Forces of a bit that starts with speeds s[V] (m/s) and s[W] (rad/s) at the depth and angle of the surface."""
+    s[WEAR] = wear_fraction(par, s[V])
+    gap, share = -surface.ahead(0.0)[0], surface.data.share
+    s[DEPTH] = surface.depth_of_cut(0.0)
+    contact = share @ (gap >= 0) / share.sum()
+    s[WC : TF + 1] = law_forces(par, s[V], s[W], s[DEPTH], contact)[2:]
+    s[CONTACT] = float(contact == 1.0 and s[W] > 0 and s[W] >= max(par[C2], par[C3]))
 
 
 def energy_imbalance(history: dict[str, F8]) -> F8:

@@ -12,12 +12,15 @@ import numpy as np
 from ..bitrock.jit import announce
 from ..bitrock.law import BitLaw
 from ..bitrock.surface import RockSurface
+from ..errors import SimulationError
 from ..models.straight import StraightString
 from ..results import Result, ResultWriter
 from ..scene import Scene
 from .audit import WORKS, Array, imbalance, variables
+from .characteristics import CharacteristicString, shafts_of
 from .condensed import CondensedString
 from .contact import rock_picture, surface_of
+from .guards import runaway
 
 #: The chunk between two looks at the clock (s of wall time, roughly) and its size at the start (steps).
 _CHUNK_SECONDS, _FIRST_CHUNK = 0.25, 200
@@ -35,15 +38,35 @@ class StraightRun:
             motions = [drive.motion(float(t)) for t in times + time.start]
             return np.array([m[0] for m in motions]), np.array([m[1] for m in motions])
 
-        self.string = CondensedString(
-            self.line.axial,
-            self.line.torsion,
-            BitLaw.from_scene(scene),
-            surface_of(scene),
-            time.step,
-            hook_load=scene.nominal().hook_load,
-            top=(drive.speed or 0.0) if drive.kind == "imposed-speed" else top,
-        )
+        law, rock = BitLaw.from_scene(scene), surface_of(scene)
+        turned = (drive.speed or 0.0) if drive.kind == "imposed-speed" else top
+        hook_load, line = scene.nominal().hook_load, self.line
+        self.string: CondensedString | CharacteristicString
+        if scene.engine == "characteristics":
+            shafts, bit_inertia = shafts_of(scene)
+            self.string = CharacteristicString(
+                line.axial,
+                shafts,
+                line.arc_length,
+                law,
+                rock,
+                time.step,
+                hook_load=hook_load,
+                top=turned,
+                bit_inertia=bit_inertia,
+                top_inertia=scene.ends.top_inertia,
+            )
+        else:
+            self.string = CondensedString(
+                line.axial,
+                line.torsion,
+                law,
+                rock,
+                time.step,
+                hook_load=hook_load,
+                top=turned,
+                integrator="exact" if time.integrator == "default" else time.integrator,
+            )
         self.string.reset(*self.line.start())
         first = self.string.sample()
         # the bit's angle counts from the start, and its twist there is part of the state
@@ -117,9 +140,14 @@ def run_condensed(
             pace = (time.perf_counter() - began) / max(1, len(rows["time"])) / every
             chunk = max(_FIRST_CHUNK, math.floor(_CHUNK_SECONDS / max(pace, 1e-9)))
             t = start + string.time
+            why = ""
             if len(rows["time"]):
-                writer.append_block(*run.history(rows))
+                times, values = run.history(rows)
+                writer.append_block(times, values)
+                why = runaway({"time": times} | values, scene)
             writer.update(**report())
+            if why:
+                raise SimulationError(why)
             if string.count % pictures == 0:
                 writer.field(t, run.fields())
             if string.count % saves == 0:

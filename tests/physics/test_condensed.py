@@ -1,4 +1,4 @@
-"""The condensed axial-torsional string: frequencies, order, energy, and the thesis' chapter 6 vertical cases."""
+"""The condensed string: frequencies, integrators and their order, energy, and the thesis' chapter 6 vertical cases."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import pytest
 from bitlab import C1
 
 from drillfem.bitrock import BitLaw, RockSurface
-from drillfem.solve.condensed import Channel, CondensedString, energy_imbalance
+from drillfem.scene import load_scene
+from drillfem.solve.condensed import INTEGRATORS, Channel, CondensedString, energy_imbalance, stable_step
+from drillfem.solve.straight import StraightRun
 
 G0, RHO, SPEED, WEIGHT_ON_BIT = 9.80665, 7800.0, 14.42, 45.7e3
 PARTS = ((1000.0, 63.5e-3, 54.0e-3), (200.0, 76.2e-3, 28.0e-3))
@@ -33,7 +35,15 @@ def lagrange_matrices(modulus, density, cells, degree=3):
 
 
 def c1_string(
-    retardation, step=1e-3, scheme="dg", elements=(53, 11), spin=0.1, top=SPEED, collar_retardation=None, parts=None
+    retardation,
+    step=1e-3,
+    scheme="dg",
+    elements=(53, 11),
+    spin=0.1,
+    top=SPEED,
+    collar_retardation=None,
+    parts=None,
+    integrator="exact",
 ):
     """The string of spec T6.1 with E = 210 GPa, g = 9.80665, in nominal drilling with a spin perturbation."""
     cells = np.concatenate([np.full(n, length / n) for (length, _, _), n in zip(PARTS, elements, strict=True)])
@@ -50,13 +60,15 @@ def c1_string(
     cut = bit.depth_of_cut(WEIGHT_ON_BIT)
     rock = RockSurface(scheme, 6, incline=-cut / (2 * np.pi))
     hook = float(axial.load.sum() - WEIGHT_ON_BIT)
-    string = CondensedString(axial, torsion, bit, rock, step, hook_load=hook, top=top, parts=parts)
+    string = CondensedString(
+        axial, torsion, bit, rock, step, hook_load=hook, top=top, parts=parts, integrator=integrator
+    )
     u, twist = string.nominal()
     string.reset(u, np.full(len(s), cut * SPEED / (2 * np.pi)), twist, SPEED * (1 + spin * s / s[-1]))
     return string
 
 
-def lumped(blades, step, surface, friction=0.3, weight=7.0, spin=0.0):
+def lumped(blades, step, surface, friction=0.3, weight=7.0, spin=0.0, integrator="exact", parts=None):
     """M1 in the units of appendix C.2: psi = 50, lambda = 5, omega_0 = 5, W = d + lambda g, T = d + beta lambda g."""
     law = BitLaw(
         specific_energy=0.5, contact_strength=2.5, contact_strength_stalled=2.5, radius=2.0, wear_flat_length=1.0,
@@ -68,7 +80,9 @@ def lumped(blades, step, surface, friction=0.3, weight=7.0, spin=0.0):
     axial = Channel(np.array([[1 / 50.0]]), np.zeros((1, 1)), np.zeros((1, 1)), 0, 0, np.array([weight]))
     spring = np.array([[1.0, -1.0], [-1.0, 1.0]])
     torsion = Channel(np.diag([0.0, 1.0]), 0 * spring, spring, 1, 0)
-    string = CondensedString(axial, torsion, law, rock, step, hook_load=0.0, top=5.0)
+    string = CondensedString(
+        axial, torsion, law, rock, step, hook_load=0.0, top=5.0, integrator=integrator, parts=parts
+    )
     u, twist = string.nominal()
     string.reset(u, np.array([cut * 5.0 / (2 * np.pi)]), twist, np.array([5.0, 5.0 * (1 + spin)]))
     return string
@@ -108,18 +122,88 @@ def test_lumped_model_without_stick(blades, friction, low, high, rate):
         assert (depth[-1] - depth[0]) / 50.0 / (10.0 / (2 * np.pi)) == pytest.approx(rate, abs=0.004)
 
 
-@pytest.mark.parametrize("scheme", ["dg", "profile"])
-def test_second_order_in_the_step(scheme):
-    def run(step):
-        h = c1_string(1e-4, step=step, scheme=scheme).advance(round(1.2 / step), round(4e-3 / step))
-        return np.stack([h["bit_angle"], h["bit_depth"], h["bit_torque"]])
+def test_set_valued_law_at_small_steps():
+    """The spin may leave zero as slowly as it likes: the path of the bit over the turn has any slope then."""
+    h = lumped(6, 2.5e-3, ("profile", {}), spin=0.1).advance(20_000)
+    assert h["bit_angular_speed"].min() < 0.01 and all(np.isfinite(values).all() for values in h.values())
 
-    steps = np.array([4e-3, 2e-3, 1e-3])
-    exact = run(1.25e-4)
-    errors = np.array([np.abs(run(h) - exact).max(axis=1) for h in steps])
-    for quantity, size in zip(errors.T, (3.5e-7, 1e-8, 0.045), strict=True):
-        assert np.polyfit(np.log(steps), np.log(quantity), 1)[0] > 1.8
-        assert quantity[-1] < size
+
+def start_with_a_pulse(string):
+    """Steady drilling, and a smooth pulse of spin on its way to the bit: nothing that a step must resolve jumps."""
+    u, twist = string.nominal()
+    s = np.linspace(0, 1, len(u))
+    pulse = np.where(abs(s - 0.6) < 0.3, np.cos(np.pi * (s - 0.6) / 0.6) ** 8, 0.0)
+    string.reset(u, np.full(len(u), string.sample()["bit_axial_speed"]), twist, SPEED * (1 + 0.2 * pulse))
+
+
+@pytest.mark.parametrize("integrator, scheme, steps, order, size", [
+    ("exact", "profile", (8e-3, 4e-3, 2e-3), 3.7, 2e-10), ("exact", "dg", (4e-3, 2e-3), 1.0, 2e-9),
+    ("trapezoidal", "profile", (4e-3, 2e-3, 1e-3), 1.9, 5e-5), ("explicit", "profile", (8e-4, 4e-4), 1.9, 1e-5),
+])  # fmt: skip
+def test_order_in_the_step(integrator, scheme, steps, order, size):
+    """Angle of a bit that cuts throughout; exact modes with a parabola for the cutting force: fourth order."""
+
+    def run(step, integrator):
+        string = c1_string(1e-4, step=step, scheme=scheme, elements=(26, 6), integrator=integrator)
+        start_with_a_pulse(string)
+        h = string.advance(round(0.56 / step), round(8e-3 / step))
+        assert string.counters["divided"] == 0
+        return h["bit_angle"]
+
+    exact = run(2.5e-4, "exact")
+    errors = np.array([np.abs(run(h, integrator) - exact).max() for h in steps])
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] > order
+    assert errors[-1] < size
+
+
+def test_second_order_where_the_bit_sticks():
+    """A step in which the bit begins or ceases to stick is resolved by its parts; all else is much better."""
+
+    def run(step, parts):
+        string = c1_string(1e-4, step=step, scheme="profile", spin=0.6, elements=(26, 6), parts=parts)
+        h = string.advance(round(2.0 / step), round(4e-3 / step))
+        return np.stack([h["bit_angle"], h["bit_depth"]]), string.counters
+
+    exact, counters = run(2.5e-4, 8)
+    assert counters["divided"] > 1000
+    coarse, fine = (np.abs(run(2e-3, parts)[0] - exact).max(axis=1) for parts in (4, 8))
+    assert (coarse > 3 * fine).all() and (fine < np.abs(exact).max(axis=1) * [1e-5, 1e-4]).all()
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_integrators_swing_like_themselves(integrator):
+    """One torsional mode off bottom: the frequency of each integrator is known."""
+    step = 0.1
+    string = lumped(4, step, ("profile", {}), integrator=integrator, parts=1)
+    string.surface.set_profile([lambda eta: 2.0 + eta])
+    string.reset(np.array([0.0]), np.array([-1000.0]), np.zeros(2), np.array([5.0, 9.0]))
+    t = step * np.arange(1, 21)
+    swing = string.advance(20)["bit_angle"] - 5 * t
+    turned = {"exact": step, "trapezoidal": 2 * np.arctan(step / 2), "explicit": 2 * np.arcsin(step / 2)}[integrator]
+    np.testing.assert_allclose(swing, swing[0] / np.sin(turned) * np.sin(turned * t / step), atol=1e-12)
+
+
+def test_explicit_steps_are_refused_beyond_the_stability_limit():
+    string = c1_string(1e-4, elements=(10, 3))
+    limit = stable_step(string.axial, string.torsion)
+    assert limit == pytest.approx(1 / (np.pi * max(f.max() for f in string.frequencies)), rel=1e-9)
+    with pytest.raises(ValueError, match=f"stable up to {limit:.4g} s"):
+        c1_string(1e-4, elements=(10, 3), step=1.001 * limit, integrator="explicit")
+    with pytest.raises(ValueError, match="must be one of exact, trapezoidal, explicit"):
+        c1_string(1e-4, elements=(10, 3), integrator="bdf")
+    h = c1_string(1e-2, elements=(10, 3), step=0.99 * limit, integrator="explicit").advance(3000)
+    assert np.abs(h["bit_angular_speed"]).max() < 20
+
+
+@pytest.mark.parametrize("integrator, size", [("trapezoidal", 1e-12), ("explicit", 1e-4)])
+def test_energy_of_the_classical_integrators(integrator, size):
+    """The trapezoidal rule keeps the books to round-off; central differences to their error, and of second order."""
+    errors = []
+    for step in (4e-4, 2e-4):
+        h = c1_string(1e-4, step=step, elements=(26, 6), spin=0.5, integrator=integrator).advance(round(3 / step))
+        errors.append(np.abs(energy_imbalance(h)).max() / (h["work_top_drive"][-1] + h["work_gravity"][-1]))
+    assert errors[1] < size
+    assert integrator == "trapezoidal" or 1e-12 < errors[1] < errors[0] / 3
 
 
 @pytest.mark.parametrize("retardation, divided", [(1e-2, False), (1e-4, True), (1e-5, True)])
@@ -222,8 +306,59 @@ def test_a_stuck_bit_does_not_ring():
         power = np.abs(np.fft.rfft(v - v.mean())) ** 2
         return power[np.fft.rfftfreq(len(v), 1e-3) > 450].sum() / power.sum()
 
-    assert c1_string(1e-5).parts == 2
+    assert c1_string(1e-5).parts == (2, 2)
     assert 20 * rattle(None) < rattle(1)
+
+
+def apart(string, other, until, spacing=0.05):
+    """Separation of two runs in spin, axial speed and depth of cut, scaled: the largest of each second."""
+    a, b = (x.advance(round(until / x.step), round(spacing / x.step)) for x in (string, other))
+    d = sum(
+        ((a[n] - b[n]) / np.abs(a[n] - a[n].mean()).max()) ** 2
+        for n in ("bit_angular_speed", "bit_axial_speed", "depth_of_cut")
+    )
+    return np.sqrt(d).reshape(round(until), -1).max(axis=1)
+
+
+def test_the_lumped_model_is_predictable():
+    """Case C1: runs that start 1e-8 apart in spin stay so for good, although the bit sticks and slips both ways."""
+
+    def start(nudge):
+        over = {"model": "lumped", "rock.surface.scheme": "profile", "initial.spin_perturbation": 0.1 * (1 + nudge)}
+        return StraightRun(load_scene("cutting-c1", over)).string
+
+    one = start(0.0)
+    d = apart(one, start(1e-8), 80)
+    assert one.counters["divided"] > 1000 and one.counters["solved"] > 1000
+    assert d.max() < 1e-6 and np.median(d[40:]) < 10 * np.median(d[:10])
+
+
+def test_little_damping_is_chaotic():
+    """c_d = 1e-5 s: nearby runs part exponentially, at a rate that no nudge changes; c_d = 1e-4 s: they do not."""
+    damped = apart(c1_string(1e-4, step=2e-3), c1_string(1e-4, step=2e-3, spin=0.1 * (1 + 1e-8)), 60)
+    assert damped.max() < 1e-5
+    rates = []
+    for nudge in (1e-10, 1e-8):
+        d = apart(c1_string(1e-5, step=2e-3), c1_string(1e-5, step=2e-3, spin=0.1 * (1 + nudge)), 60)
+        rates.append(np.polyfit(np.arange(20, 60), np.log(d[20:]), 1)[0])
+        assert d[-5:].max() > 1e3 * nudge
+    assert 0.08 < min(rates) and max(rates) < 0.3
+
+
+def test_inertia_at_the_bit_leads_to_the_lumped_model():
+    """All inertia but the share alpha at the bit, collars stiff in proportion (5.5.4): the axial waves die out, too."""
+
+    def history(model, alpha):
+        stiff = {"youngs_modulus": 210e9, "shear_modulus": 77e9 / alpha, "density": 7800.0}
+        over = {"model": model, "rock.surface.scheme": "profile", "mesh.elements": 24}
+        if model != "lumped":
+            over |= {"inertia.distributed": alpha, "string.1.material": stiff}
+        return StraightRun(load_scene("cutting-c1", over)).string.advance(2000, 4)["bit_angle"]
+
+    exact, alphas = history("lumped", 1.0), np.array([6.4e-3, 3.2e-3, 1.6e-3])
+    errors = [np.abs(history("axial-torsional", a) - exact).max() for a in alphas]
+    assert np.polyfit(np.log(alphas), np.log(errors), 1)[0] > 0.8
+    assert errors[-1] < 2e-4 * np.abs(exact).max()
 
 
 def spectrum(history, name, window):
