@@ -57,7 +57,7 @@ class Rung:
 LUMPED = Rung("lumped", "cutting-c1", {"model": "lumped"})
 TORSIONAL = Rung("torsional", "cutting-c1", {"model": "torsional"})
 WAVES = Rung("torsional, characteristics", "cutting-c1", {"model": "torsional", "time.engine": "characteristics"})
-BOTH = Rung("axial-torsional", "vertical-c1-cd4", {"model": "axial-torsional"})
+BOTH = Rung("axial-torsional, c_d = 1e-4 s", "vertical-c1-cd4", {"model": "axial-torsional"})
 LIGHT = Rung("axial-torsional, c_d = 1e-5 s", "vertical-c1-cd5", {"model": "axial-torsional"})
 PROFILE = "profile"
 
@@ -262,8 +262,8 @@ def draw(found: list[Parting], path: Path) -> None:
         style.heading(
             figure,
             "How long a run can be foretold",
-            "Separation of runs whose first spin differs by 1e-6, 1e-8, 1e-10 of its perturbation "
-            "(of spin, axial speed and depth of cut, scaled; largest in each second)",
+            "Runs that start a nudge apart: "
+            "largest difference in each second of spin, axial speed, depth of cut, scaled",
         )
         axes = figure.subplots(2, 2, sharey=True)
         for ax, p in zip(axes.flat, found, strict=True):
@@ -368,8 +368,8 @@ depth the largest difference over the largest value; of its spin also the root m
 In the lumped model nothing jumps, and a step is of fourth order but for the steps in which the bit begins or ceases to
 stick, which are divided by 8. In the undamped torsional model the torque of the wear flats jumps when the bit sticks,
 and the spin of a bit without inertia jumps with it: its largest error says when, not how much, and does not shrink.
-After some seconds this bit stalls, and what a stall does hangs on tenths of a millisecond: see the horizon below. Before
-that (first 2 s) the errors of angle and depth at 2 ms are {stalled[0]} and {stalled[1]}.
+After some seconds this bit stalls, and what a stall does hangs on tenths of a millisecond: see the horizon below.
+Before that (first 2 s) the errors of angle and depth at 2 ms are {stalled[0]} and {stalled[1]}.
 
 Whole runs, results written to memory:
 
@@ -422,7 +422,8 @@ smallest difference, up to 1e-3. Horizon: when a difference of a hundredth is re
 The lumped model and the axial-torsional string with c_d = 1e-4 s are not chaotic: nearby runs stay together, and a
 pointwise comparison makes sense at any time. With c_d = 1e-5 s they part exponentially. The undamped torsional string
 forgets small differences while it turns, and gains them in steps, when the bit stalls or turns back: it has no inertia,
-so there its spin jumps, and whether it does in this part of a step or in the next is a matter of rounding.
+so there its spin jumps, and whether it does in this part of a step or in the next is a matter of rounding; its fitted
+rate is an average over such steps, not an exponent.
 
 What remains after the horizon, over the last half of these runs (rate of penetration, mean torque from the work of the
 bit, standard deviation and largest value of the spin):

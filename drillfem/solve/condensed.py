@@ -8,6 +8,7 @@ its exact solution, so that only the history of the bit force P within the step 
   and the end of the step (fourth order), and the wear-flat force is constant;
 * the wear-flat force is constant in the step and takes its end value, and so is everything while the bit is
   stalled, turns backwards, leaves the bottom or lands: a linear multiplier would ring where the bit sticks;
+* a rigid mass that sticks axially on a turning bit is held in the middle and at the end of the step (second order);
 * a step in which the wear-flat force changes, or that is not cutting throughout, is divided: so that the fastest mode
   is resolved (on longer steps the modes beyond the sampling rate answer a sticking bit with the wrong sign, and it
   rings), and so that the moment at which it sticks or slips is.
@@ -277,7 +278,8 @@ def condense(
         numbers += [inertia, uniform @ bit, float(largest > 0.0), exact, exact / 12.0, 0.0, float(not square.any())]
         return np.stack([*own, *answers, *loss, *mixed, *to_middle, *shape_rows]), np.array(numbers), big
 
-    return Modes(*(np.stack(arrays) for arrays in zip(*map(data, steps), strict=True))), shapes
+    made = {step: data(step) for step in sorted(set(steps))}
+    return Modes(*(np.stack(arrays) for arrays in zip(*(made[step] for step in steps), strict=True))), shapes
 
 
 def _below(torsion: Channel) -> NDArray[np.int64]:
@@ -466,9 +468,7 @@ def _cut_on(par: F8, surface: SurfaceData, axial: F8, torsion: F8, s: F8, free: 
 
 
 @kernel(lean=True)
-def _stick_on(
-    par: F8, surface: SurfaceData, axial: F8, torsion: F8, s: F8, free: F8, step: float, work: F8, out: F8
-) -> bool:
+def _stick_on(par: F8, surface: SurfaceData, axial: F8, torsion: F8, s: F8, free: F8, work: F8, out: F8) -> bool:
     """Step in which a rigid mass on the bit sticks axially while the bit turns and cuts: as `_cut_on`, and the
     wear-flat force is linear in the step and holds the mass in its middle and at its end.
 
@@ -608,7 +608,8 @@ def end_of_step(
 ) -> bool:
     """Solve the bit, turn the rock and keep the books of one step; the bit forces of the step are left in ``s``.
 
-    axial, torsion : Modes.number of the step.  free (6,) : as for `_cut_on`, turns from the committed angle.
+    axial, torsion : Modes.number of the step.  free (7,) : as for `_cut_on`, turns from the committed angle; then the
+    spin at the start without bit force, where the string has no inertia.
     turned : rad, by which the top turned.  A ``whole`` step must be smooth: else False, and nothing has changed.
     """
     steady = s[WEAR] == 0.0 or s[WEAR] == 1.0
@@ -617,7 +618,7 @@ def end_of_step(
         if steady:
             smooth = _cut_on(par, surface, axial, torsion, s, free, work, out)
         elif axial[RIGID] > 0.0:
-            smooth = _stick_on(par, surface, axial, torsion, s, free, step, work, out)
+            smooth = _stick_on(par, surface, axial, torsion, s, free, work, out)
     if not smooth and whole and (axial[FOURTH] > 0.0 or not steady):
         return False
     if not smooth and s[CONTACT] > 0.0:

@@ -174,6 +174,17 @@ def differences(one: Result, other: Result, *names: str) -> list[float]:
     return [float(np.abs(a[n].values - b[n].values).max() / np.abs(a[n].values).max()) for n in names]
 
 
+def test_rungs_agree_with_inertia_lumped_at_the_bit() -> None:
+    """Chapter 6, V1: alpha = 0.05 in the weak form of both PETSc rungs, and in the condensed string."""
+    few = {"inertia.distributed": 0.05, "mesh.elements": 12, "mesh.degree": 2}
+    straight, spatial, condensed = (
+        drillfem.simulate(scene(**few | over), until=0.3) for over in (PETSC, PETSC | {"model": "spatial"}, {})
+    )
+    assert max(differences(straight, spatial, "bit_angle", "bit_depth", SPIN)) < 1e-5
+    assert max(differences(straight, condensed, "bit_angle", "bit_depth", SPIN)) < 2e-3
+    assert spatial.summary["energy_balance_error"] < 1e-5
+
+
 def assert_rungs_agree(end: float) -> None:
     straight = drillfem.simulate(scene(**PETSC), until=end)
     spatial = drillfem.simulate(scene(**PETSC | {"model": "spatial"}), until=end)
