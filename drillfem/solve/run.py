@@ -66,17 +66,22 @@ def _run(
 
 
 def simulate(
-    scene: Scene, out: str | Path | None = None, progress: Progress | None = None, until: float | None = None
+    scene: Scene,
+    out: str | Path | None = None,
+    progress: Progress | None = None,
+    until: float | None = None,
+    *,
+    warn: bool = True,
 ) -> Result:
     """Simulate a scene.
 
     scene: what to simulate. out: new folder for the result, or None to keep it in memory. progress: called with
     (time reached, time of the end, simulated seconds per wall second). until: stop at this time (s) rather than at
-    ``time.end``.
+    ``time.end``. warn: log what is known to go wrong with the scene (`drillfem.solve.guards`).
 
     Raises SceneError (bad input; nothing is written) and SimulationError (what was computed is kept in ``out``).
     """
-    return _run(scene, None if out is None else Path(out), until, progress, resume=False)
+    return _run(scene, None if out is None else Path(out), until, progress, resume=False, warn=warn)
 
 
 def resume(folder: str | Path, progress: Progress | None = None, until: float | None = None) -> Result:

@@ -114,7 +114,7 @@ def measure(scene: Scene, highest: float, end: float = 40.0) -> tuple[Motion, tu
     nominal = scene.nominal()
     until = end / 16
     while True:
-        history = simulate(scene, until=until).history
+        history = simulate(scene, until=until, warn=False).history  # only small motions are looked at
         speed = np.abs(history["bit_axial_speed"].values / nominal.rate_of_penetration - 1)
         far = np.flatnonzero(speed > LINEAR)
         if len(far) or until >= end:
