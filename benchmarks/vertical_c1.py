@@ -356,7 +356,7 @@ As published: after a quiet time the torsional motion grows again, in S2 at 3.18
 vibration, and the bit never stops turning; axially it sticks a third of the time. The published lines are there
 within 1 %, but for two. The slowest is at 0.52, 0.52 and 0.48 Hz beside 0.45: while the bit chatters the first
 torsional vibration is faster than without (0.457 Hz at 1e-2 s), in all refinements and starts; among the thesis'
-lines, 0.05 Hz apart, ours read 0.50. The torsional 13.50 Hz of S3 is one of a band in ours, which 13.99 Hz leads;
+lines, 0.05 Hz apart, ours read 0.50. The torsional 13.50 Hz of S3 is one of a band of 13.5 to 14 Hz in ours;
 axially 13.5 and 11.6 Hz are equally strong there, within the published band of 11 to 16 Hz.
 
 ## c_d = 1e-5 s: stick-slip in both directions
@@ -371,8 +371,8 @@ rules, and which one is left to chance. Torsional vibrations compete for tens or
 
 {motions()}
 
-The shipped step finds the locked motion more often than finer ones; nine starts cannot tell whether that is
-chance. Frequencies, amplitudes and torque of a motion agree within 0.3 % at all steps.
+Steps may differ in how many of nine starts have locked by then; nine cannot tell whether that is chance.
+Frequencies, amplitudes and torque of the locked motion agree within 0.4 % at all steps.
 
 ## How long a run can be foretold
 
@@ -395,7 +395,7 @@ through PETSc at 1 ms. *Condensed* and *PETSc*: the straight string at 1 ms agai
 {far()}
 
 The thesis orders the depths 1e-4 > 1e-5 > 1e-3 > 1e-2. So do the scenes and the starts near them: the first two
-differ by 1.5 %, ten times their scatter (at 200 s they do not). The last lines show other motions that the
+differ by 1.5 %, several times their scatter (at 200 s they do not). The last lines show other motions that the
 least damped string can end in; locked to 0.46 Hz it drills deeper than at 1e-4 s, so the order holds for the motion
 that is won, not for the damping.
 """
