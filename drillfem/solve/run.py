@@ -60,7 +60,7 @@ def _run(
 
         result = run_dynamic(scene, writer, end, tell)
     error = result.summary["energy_balance_error"]
-    if error is not None and error > _SUSPECT:
+    if warn and error is not None and error > _SUSPECT:
         log.warning("energy balance error %.2g: these results are not to be trusted, try a smaller time.step", error)
     return result
 
@@ -77,7 +77,8 @@ def simulate(
 
     scene: what to simulate. out: new folder for the result, or None to keep it in memory. progress: called with
     (time reached, time of the end, simulated seconds per wall second). until: stop at this time (s) rather than at
-    ``time.end``. warn: log what is known to go wrong with the scene (`drillfem.solve.guards`).
+    ``time.end``. warn: log what is known to go wrong with the scene (`drillfem.solve.guards`), and an energy balance that
+    does not close.
 
     Raises SceneError (bad input; nothing is written) and SimulationError (what was computed is kept in ``out``).
     """

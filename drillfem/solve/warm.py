@@ -12,6 +12,9 @@ _RUNS: tuple[tuple[str, dict[str, object], float | None], ...] = (
     ("vertical-c1-cd4", {"model": "spatial"}, 0.003),
     ("vertical-c1-cd4", {"model": "axial-torsional", "time.engine": "petsc"}, 0.003),
     ("vertical-c1-cd4", {"model": "axial-torsional"}, 0.003),
+    ("cutting-c1", {}, 0.003),
+    ("cutting-c1", {"time.engine": "characteristics", "rock.surface.scheme": "supg"}, 0.003),
+    ("vertical-v1", {}, 0.003),
     ("spin-up", {}, 0.01),
     ("pendulum", {}, 0.01),
     ("roll-up", {}, None),
@@ -25,4 +28,4 @@ def warm_up(tell: Callable[[str], None] | None = None) -> None:
         if tell is not None:
             tell(name)
         scene = load_scene(name, overrides)
-        simulate(scene, until=None if until is None else max(until, 2 * scene.time.step))
+        simulate(scene, until=None if until is None else max(until, 2 * scene.time.step), warn=False)
