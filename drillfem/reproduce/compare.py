@@ -236,7 +236,7 @@ def compare(case: Case, studio: Studio, imitated: bool = False, brief: bool = Fa
 
 
 def _explanation(claim: Claim, value: Value, found: list[tuple[str, Value]]) -> str:
-    """Which variations give the printed value; else the one that comes clearly nearer than ours."""
+    """Which variations give the printed value; else the one that comes clearly nearer, or the one beyond print."""
     agreeing = dict.fromkeys(label for label, x in found if judge(claim, x) in GOOD)
     if agreeing:
         return "as printed with: " + "; ".join(agreeing)
@@ -246,7 +246,16 @@ def _explanation(claim: Claim, value: Value, found: list[tuple[str, Value]]) -> 
         return math.inf if share is None or share <= 0 else abs(math.log(share))
 
     label, best = min(found, key=lambda pair: far(pair[1]), default=("", value))
-    return f"nearest with {label}: ratio {ratio(claim, best):.2f}" if far(best) < 0.8 * far(value) else ""
+    if far(best) < 0.8 * far(value):
+        return f"nearest with {label}: ratio {ratio(claim, best):.2f}"
+    ours = ratio(claim, value)
+    across = [
+        (label, x)
+        for label, x in found
+        if ours and (share := ratio(claim, x)) and 0 < share and (ours > 1) != (share > 1)
+    ]
+    label, other = min(across, key=lambda pair: far(pair[1]), default=("", value))
+    return f"between ours and that with {label}: ratio {ratio(claim, other):.2f}" if across else ""
 
 
 def _table(case: Case, experiment: Experiment, studio: Studio) -> Table:

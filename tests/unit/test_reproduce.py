@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from dataclasses import replace
 
@@ -121,6 +122,15 @@ def test_the_nearest_variation_is_named_where_none_agrees(steady):
     ))  # fmt: skip
     (row,) = compare(far, Studio()).rows
     assert row.verdict == DIFFERS and row.reason.startswith("nearest with friction 1.1: ratio 0.9")
+
+
+def test_print_between_ours_and_a_variation(steady):
+    """Where no variation comes nearer, one beyond print still says what could have moved it."""
+    harder = Variation("friction 1.1", {"bit.friction": 1.1})
+    experiment = replace(steady.experiments[0], show=("T",), variations=(harder,))
+    claim = replace(steady.claims[0], published=math.sqrt(3264.0 * 3780.0))  # half way, in ratio
+    (row,) = compare(replace(steady, claims=(claim,), experiments=(experiment,)), Studio()).rows
+    assert row.verdict == DIFFERS and row.reason.startswith("between ours and that with friction 1.1: ratio 1.08")
 
 
 def test_experiments_page_and_data(report):
