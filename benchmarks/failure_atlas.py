@@ -34,7 +34,6 @@ from drillfem.solve.guards import (
     Method,
     boundary,
     locking_factor,
-    passage,
     quaternion_norm,
     refuse,
     self_excitation,
@@ -684,7 +683,7 @@ def steps() -> Entry:
         1,
         draw,
     )
-    step = 2 * passage(load_scene("vertical-c1-cd4")) / 64
+    step = 2 * load_scene("vertical-c1-cd4").blade_passage / 64
     rows = []
     for engine, n in (("petsc", 16), ("petsc", 32), ("petsc", 64), ("condensed", 16)):
         for f, true in roots.items():

@@ -11,7 +11,6 @@ from scipy.linalg import eigh
 
 from drillfem.models.straight import StraightString
 from drillfem.scene import Scene, load_scene
-from drillfem.solve.guards import passage
 from drillfem.solve.run import simulate
 
 Array = npt.NDArray[np.float64]
@@ -88,7 +87,7 @@ def cutting_growth(engine: str, steps: int, frequency: float = 13.34) -> float:
     The characteristic roots are 1.8705 + 83.8196i (13.34 Hz) and 1.8819 + 165.4152i (26.33 Hz). Nan if none is near.
     """
     scene = load_scene("vertical-c1-cd4", {"mesh.elements": 24, "initial.spin_perturbation": 1e-6})
-    h, end = passage(scene) / steps, 4.0
+    h, end = scene.blade_passage / steps, 4.0
     scene = replace(
         scene,
         time=replace(scene.time, end=end, step=h, engine=engine),

@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError, SimulationError
+from ..models.straight import have_forms
 from ..scene import Scene, load_scene
 from ..solve.straight import StraightRun
 from .points import Chart, Level, Panel, Point, cpu_seconds, normalise, relative_l2
@@ -220,7 +220,7 @@ def _steps(bench: Bench, facts: dict[str, Any], tell: Tell) -> Panel:
     }
     if case == "torsional":
         series["characteristics"] = (profile | marched, effort.steps, marched)
-    if case == "axial-torsional" and find_spec("dolfinx") is not None:
+    if case == "axial-torsional" and have_forms():
         petsc, full = profile | {"time__engine": "petsc"}, {"time__jacobian": "every-iteration"}
         series["PETSc, kept Jacobian"] = (petsc | {"time__jacobian": "kept"}, effort.steps, condensed)
         series["PETSc, full Newton"] = (petsc | full, effort.slow_steps, condensed)

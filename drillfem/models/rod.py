@@ -29,6 +29,7 @@ from ..forms.constitutive import SECTION, Section, elastic_resultants, viscous_r
 from ..meshes.string import BOTTOM, TOP, StringMesh, string_mesh
 from ..scene import Scene
 from ..scene.nominal import lumped_at_bit
+from .steady import outer_diameter
 
 #: Velocity components that an end condition holds; the spin of a driven top is imposed by the drive instead.
 _HELD = {
@@ -168,7 +169,7 @@ class Rod:
 
     def _loads(self) -> vw.Loads:
         scene, ends, c = self.scene, self.scene.ends, self.constant
-        hook_load = scene.nominal().hook_load if scene.bit is not None and scene.bit.kind == "cutting" else 0.0
+        hook_load = scene.nominal().hook_load if scene.drills else 0.0
         wall = None
         if scene.contact is not None and scene.hole.diameter and self.model in ("spatial", "planar"):
             k = scene.contact
@@ -202,7 +203,7 @@ class Rod:
     @property
     def has_bit(self) -> bool:
         """Whether rock loads the lower end."""
-        return self.scene.bit is not None and self.scene.bit.kind == "cutting"
+        return self.scene.drills
 
     def _stress_free_curvature(self) -> tuple[float, float, float]:
         reference = self.scene.reference
@@ -470,7 +471,5 @@ class Rod:
 
     @cached_property
     def outer_diameter(self) -> Array:
-        """Outer diameter at the nodes (m); at a change of section that of the upper one."""
-        ends = np.cumsum([section.length for section in self.scene.string])
-        of = np.searchsorted(ends, self.arc_length * (1 - 1e-12)).clip(max=len(ends) - 1)
-        return np.array([section.outer_diameter or 0.0 for section in self.scene.string])[of]
+        """Outer diameter at the nodes (m)."""
+        return outer_diameter(self.scene, self.arc_length)

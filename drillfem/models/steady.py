@@ -32,6 +32,13 @@ def stretch_and_twist(scene: Scene, s: Array) -> tuple[Array, Array]:
     return f, psi
 
 
+def outer_diameter(scene: Scene, s: Array) -> Array:
+    """Outer diameter (m) at arc lengths ``s``; of the upper section where two meet, 0 where not given."""
+    ends = np.cumsum([section.length for section in scene.string])
+    of = np.searchsorted(ends, s * (1 - 1e-12)).clip(max=len(ends) - 1)
+    return np.array([section.outer_diameter or 0.0 for section in scene.string])[of]
+
+
 def spin_perturbation(scene: Scene) -> float:
     """Extra spin of the bit at the start (rad/s); ``initial.seed_perturbation`` draws a nearby start."""
     initial = scene.initial

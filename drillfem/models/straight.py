@@ -18,7 +18,7 @@ import numpy.typing as npt
 from ..meshes.points import distribute, nodes
 from ..scene import Scene
 from ..scene.nominal import lumped_at_bit, lumps
-from .steady import spin_perturbation, stretch_and_twist
+from .steady import outer_diameter, spin_perturbation, stretch_and_twist
 
 F8 = npt.NDArray[np.float64]
 
@@ -140,10 +140,15 @@ def wave_matrices(scene: Scene) -> tuple[Matrices | None, Matrices]:
     return motion(axial, per_length, (ends.top_mass, ends.bottom_mass), mass, g), turning
 
 
-def _weak_form() -> Callable[[Scene], tuple[Matrices | None, Matrices]] | None:
-    """The assembly from the weak form, if DOLFINx is installed."""
-    if find_spec("dolfinx") is None or find_spec("petsc4py") is None:
-        return None
+def have_forms() -> bool:
+    """Whether forms can be compiled and assembled here: DOLFINx and PETSc are installed."""
+    return find_spec("dolfinx") is not None and find_spec("petsc4py") is not None
+
+
+def _assembly() -> Callable[[Scene], tuple[Matrices | None, Matrices]]:
+    """The assembly from the weak form where it can be had, else NumPy's."""
+    if not have_forms():
+        return wave_matrices
     from .straight_forms import matrices_of
 
     return matrices_of
@@ -168,7 +173,7 @@ class StraightString:
             self.axial, self.torsion = rigid, Channel(body, lumped.retardation * spring, spring, 1, 0)
             self.arc_length: F8 = np.array(scene.interfaces)
             return
-        axial, torsion = (_weak_form() or wave_matrices)(scene)
+        axial, torsion = _assembly()(scene)
         self.arc_length = self._elements.arc_length
         last = len(self.arc_length) - 1
         self.torsion = Channel(torsion.mass, torsion.damping, torsion.stiffness, last, 0)
@@ -255,7 +260,5 @@ class StraightString:
 
     @cached_property
     def outer_diameter(self) -> F8:
-        """Outer diameter at the nodes (m); at a change of section that of the upper one."""
-        ends = np.cumsum([x.length for x in self.scene.string])
-        of = np.searchsorted(ends, self.arc_length * (1 - 1e-12)).clip(max=len(ends) - 1)
-        return np.array([x.outer_diameter or 0.0 for x in self.scene.string])[of]
+        """Outer diameter at the nodes (m)."""
+        return outer_diameter(self.scene, self.arc_length)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import logging
 import time as clock
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -124,21 +122,6 @@ def on(scene: Scene, model: str) -> Scene:
     return replace(scene, model=model, time=time, output=replace(scene.output, wanted=None)).checked()
 
 
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep the warnings of runs to themselves: the plan speaks for them. That kernels are compiled is still said."""
-    log = logging.getLogger("drillfem")
-
-    def unless_warning(record: logging.LogRecord) -> bool:
-        return record.levelno != logging.WARNING
-
-    log.addFilter(unless_warning)
-    try:
-        yield
-    finally:
-        log.removeFilter(unless_warning)
-
-
 def run_pilot(scene: Scene, chosen: str, able: list[str]) -> Pilot:
     """Run the rungs ``able`` of a scene for `SECONDS`; those that PETSc steps only for `PACE_STEPS` steps.
 
@@ -171,7 +154,7 @@ def run_pilot(scene: Scene, chosen: str, able: list[str]) -> Pilot:
 
         try:
             look()
-            return simulate(one, until=time.start + duration, progress=look)
+            return simulate(one, until=time.start + duration, progress=look, warn=False)  # the plan speaks for its runs
         except (DrillfemError, ImportError, _TooSlowError) as error:
             failed[name] = " ".join(str(error).split())
             return None
@@ -200,24 +183,23 @@ def run_pilot(scene: Scene, chosen: str, able: list[str]) -> Pilot:
     whole = [m for m in able if on(scene, m).engine != "petsc"]
     slow = [m for m in able if m not in whole]
     paced = min(seconds, PACE_STEPS * time.step)
-    with _quiet():
-        runs = march(whole, seconds)
-        if chosen in slow or not runs:
-            march(slow, paced)
-        if not runs:
-            return Pilot(seconds, speed=speed, dofs=dofs, failed=failed)
-        reference = max(runs, key=rank)
-        subject = chosen if chosen in runs else reference
-        taken = {model: signals(result, names) for model, result in runs.items()}
-        numerics = {}
-        for name, other in _changed(on(scene, subject)).items():
-            result = attempt(name, other, seconds)
-            if result is not None:
-                numerics[name] = _deviations(taken[subject], signals(result, names))
-                if name.startswith("start"):
-                    pace(subject, result)
-        if chosen not in slow:
-            march(slow, paced)
+    runs = march(whole, seconds)
+    if chosen in slow or not runs:
+        march(slow, paced)
+    if not runs:
+        return Pilot(seconds, speed=speed, dofs=dofs, failed=failed)
+    reference = max(runs, key=rank)
+    subject = chosen if chosen in runs else reference
+    taken = {model: signals(result, names) for model, result in runs.items()}
+    numerics = {}
+    for name, other in _changed(on(scene, subject)).items():
+        result = attempt(name, other, seconds)
+        if result is not None:
+            numerics[name] = _deviations(taken[subject], signals(result, names))
+            if name.startswith("start"):
+                pace(subject, result)
+    if chosen not in slow:
+        march(slow, paced)
     main = {}
     for model, result in runs.items():
         spin = signals(result, ("bit_angular_speed",)).get("bit_angular_speed")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import time
 from collections.abc import Callable, Iterable
@@ -118,24 +117,20 @@ class Studio:
             self.tell(f"{folder}: {v.label}" if v.label else folder)
             scene = load_scene(run.scene, changes)
             start = time.perf_counter()
+            out = self.out / folder if self.out and variation is None else None
             # a variation is made to be wrong; a scene as shipped may well be warned about
-            log = logging.getLogger("drillfem")
-            level = log.level
-            if variation is not None:
-                log.setLevel(logging.ERROR)
-            try:
-                history = self._history(scene, v, until, self.out / folder if self.out and variation is None else None)
-            finally:
-                log.setLevel(level)
+            history = self._history(scene, v, until, out, warn=variation is None)
             self._done[key] = Signals.of(scene, history, time.perf_counter() - start)
         return self._done[key].read_as(v.reading)
 
-    def _history(self, scene: Scene, variation: Variation, until: float | None, out: Path | None) -> xr.Dataset:
+    def _history(
+        self, scene: Scene, variation: Variation, until: float | None, out: Path | None, warn: bool
+    ) -> xr.Dataset:
         if variation.numerics is not None:
             return imitate(scene, variation.numerics, until)
         from drillfem.solve import simulate
 
-        return simulate(scene, out=out, until=until).history
+        return simulate(scene, out=out, until=until, warn=warn).history
 
 
 class Family:

@@ -67,9 +67,8 @@ def _ends(scene: Scene) -> Iterator[tuple[str, End, End]]:
     """Kind of motion, top and bottom: what `[ends]` holds, and what is lumped there."""
     ends = scene.ends
     mass, inertia = lumped_at_bit(scene) if scene.inertia.distributed != 1 else (0.0, 0.0)
-    drills = scene.bit is not None and scene.bit.kind == "cutting"
     # a string that drills hangs on a constant load
-    hangs = ends.top == "free" or (ends.top == "driven" and drills)
+    hangs = ends.top == "free" or (ends.top == "driven" and scene.drills)
     clamped = ends.bottom == "clamped"
     yield "axial", End(not hangs, ends.top_mass), End(clamped, ends.bottom_mass + mass)
     yield (

@@ -69,11 +69,6 @@ def across(v: Sequence[float]) -> bool:
     return abs(v[0]) > 1e-12 or abs(v[1]) > 1e-12
 
 
-def drills(scene: Scene) -> bool:
-    """Whether there is a bit that cuts."""
-    return scene.bit is not None and scene.bit.kind == "cutting"
-
-
 # -- what a rung has no room for --------------------------------------------------------------------------
 def obstacle(scene: Scene, model: str) -> str:
     """Why `model` cannot represent the scene at all, or cannot give what is wanted; empty if it can."""
@@ -82,7 +77,7 @@ def obstacle(scene: Scene, model: str) -> str:
     motion = (scene.initial.velocity, scene.initial.angular_velocity)
     if missing := [name for name in scene.output.wanted or () if rank(giver(name)) > rank(model)]:
         return f"it does not give {' and '.join(missing)}"
-    if model == "lumped" and not drills(scene):
+    if model == "lumped" and not scene.drills:
         return "it stands for a string on a cutting bit, and there is none"
     if model not in ("lumped", "torsional") and any(s.name == SPRING for s in scene.string):
         return "it was given by numbers and has no string"
@@ -97,7 +92,7 @@ def obstacle(scene: Scene, model: str) -> str:
             return "the load at the tip bends the string"
         if (turns and across(scene.top_drive.axis)) or any(map(across, motion)):
             return "the motion is not along and about the string's axis"
-        if model == "torsional" and not drills(scene) and (ends.tip_force[2] or motion[0][2]):
+        if model == "torsional" and not scene.drills and (ends.tip_force[2] or motion[0][2]):
             return "the string is loaded or moves along its axis"
     if model == "planar":
         if scene.bit is not None:
@@ -284,7 +279,7 @@ def tension(scene: Scene) -> tuple[F8, F8] | None:
     weight = down * np.array([s.mass_per_length * s.length for s in scene.string])
     below = np.append(weight[::-1].cumsum()[::-1], 0.0)  # weight of the string below each interface
     held = ends.top in ("clamped", "pinned", "hung", "driven")
-    if drills(scene):
+    if scene.drills:
         lowest = -scene.nominal().weight_on_bit
     elif ends.bottom == "clamped" and held:
         softness = np.array([s.length / s.section_stiffness().axial for s in scene.string])
@@ -397,7 +392,7 @@ def buckling_rule(scene: Scene) -> Finding:
     numbers = {"compression": weight, "critical": critical}
     neutral = scene.length - float(np.interp(0.0, pull[1][::-1], pull[0][::-1])) if pull[1][0] > 0 else scene.length
     numbers["compressed_length"] = neutral
-    what = "weight on bit" if drills(scene) else "compression at the bottom"
+    what = "weight on bit" if scene.drills else "compression at the bottom"
     text = f"{what} {quantity(weight, 'N')}, the string buckles at {quantity(critical, 'N')}"
     if scene.ends.bottom == "bit":
         numbers["critical_tilting"] = critical_weight(scene, bit_tilts=True)
@@ -420,11 +415,11 @@ def output_rule(scene: Scene) -> Finding:
     """The lowest rung whose results hold what is wanted (`GIVES`)."""
     wanted, source = scene.output.wanted, "what the unknowns of each rung determine"
     if not wanted:
-        if drills(scene):
+        if scene.drills:
             return Finding("wanted outputs", "lumped", "not given: motion and loads of the bit", {}, source)
         return Finding("wanted outputs", "axial-torsional", "not given: all motion", {}, source)
     givers = {name: giver(name) for name in wanted}
-    if not drills(scene):  # nothing couples twist and stretch
+    if not scene.drills:  # nothing couples twist and stretch
         givers = {
             name: "torsional" if name in _TWIST else max(m, "axial-torsional", key=rank) for name, m in givers.items()
         }
@@ -454,20 +449,12 @@ class Growing(NamedTuple):
         return f"{self.frequency:.3g} Hz ({self.growth:+.2g} 1/s)"
 
 
-def blade_passing(scene: Scene) -> float:
-    """Frequency (Hz) at which blades pass, at the nominal speed of the top; 0 where nothing is cut."""
-    if scene.bit is None or not drills(scene):
-        return 0.0
-    return scene.bit.blades * abs(scene.top_drive.speed or 0.0) / (2 * math.pi)
-
-
 def growing_motions(scene: Scene, axial_waves: bool) -> list[Growing]:
     """Linear self-excitation of the bit up to `BAND` times the blade-passing frequency, fastest first.
 
     The collars move along the axis as a rigid mass, or (``axial_waves``) the whole string does in its waves; torsion
     is the lumped one in both. Motions that grow less than e-fold in the run, or by less than ``output.tolerance`` of
-    the fastest, are left out: they do not decide what is seen. Roots of the loop of `drillfem.stability`, by Newton's
-    method from the natural motions and a grid.
+    the fastest, are left out: they do not decide what is seen. Roots of the loop of `drillfem.stability`.
     """
     # the loop belongs to a room on the right of this one: imported only where a drilling scene asks for it
     from drillfem.stability.loop import DrillingLoop, motions, pitch
@@ -476,33 +463,14 @@ def growing_motions(scene: Scene, axial_waves: bool) -> list[Growing]:
     loop = rigid
     if axial_waves:
         loop = replace(rigid, axial=motions(replace(scene, model="axial-torsional"))[0])
-    speed = np.array(float(scene.top_drive.speed or 0.0))
-    rho = np.asarray(pitch(scene, np.array(scene.nominal().weight_on_bit)))
-    limit = 2 * math.pi * BAND * blade_passing(scene)
-    even = np.linspace(0.02, 1.0, 40) * limit
-    own = loop.axial.poles(limit)
-    s = np.concatenate([1j * even + g for g in (0.3, 3.0, 12.0)] + [1j * own.imag + g for g in (0.02, 0.5)])
-    for _ in range(40):
-        h = 1e-6 * np.abs(s)
-        slope = (loop.characteristic(s + h, speed, rho) - loop.characteristic(s - h, speed, rho)) / (2 * h)
-        with np.errstate(all="ignore"):
-            step = loop.characteristic(s, speed, rho) / slope
-            step *= np.minimum(1.0, 0.1 * np.abs(s) / np.abs(step))
-        # what runs away is of no use
-        s = np.where(np.isfinite(step) & (np.abs(s.real) < limit), s - step, np.nan)
-        s, step = s[np.isfinite(s)], step[np.isfinite(s)]
-        if not len(s) or np.all(np.abs(step) < 1e-9 * np.abs(s)):
-            break
-    done = s[(np.abs(step) < 1e-9 * np.abs(s)) & (np.abs(s.imag) <= limit) & (s.real > 0)] if len(s) else s
-    roots: list[complex] = []
-    for z in sorted(done, key=lambda z: -z.real):
-        z = complex(z.real, abs(z.imag))
-        if z.imag > 1e-3 and all(abs(z - y) > 1e-6 * abs(z) for y in roots):
-            roots.append(z)
+    limit = 2 * math.pi * BAND / scene.blade_passage
+    speed, weight = np.array([scene.top_drive.speed or 0.0]), np.array([scene.nominal().weight_on_bit])
+    found = loop.roots(speed, pitch(scene, weight))
+    roots = sorted((z for z in found.values[0] if z.real > 0 and 1e-3 < z.imag <= limit), key=lambda z: -z.real)
     least = 1 / (scene.time.end - scene.time.start)
     if roots:
         least = max(least, scene.output.tolerance * roots[0].real)
-    return [Growing(z.imag / (2 * math.pi), z.real) for z in roots if z.real > least]
+    return [Growing(float(z.imag) / (2 * math.pi), float(z.real)) for z in roots if z.real > least]
 
 
 def distance(one: Iterable[Growing], other: Iterable[Growing]) -> float:
@@ -544,7 +512,7 @@ def modes_of(waves: Waves, limit: float) -> list[Mode]:
 def _drilling_waves(scene: Scene) -> bool:
     """Whether the scene has steady drilling to be perturbed: the rules about waves start from it."""
     speed = scene.top_drive.speed
-    return drills(scene) and bool(speed and speed > 0) and scene.nominal().depth_of_cut > 0
+    return scene.drills and bool(speed and speed > 0) and scene.nominal().depth_of_cut > 0
 
 
 def axial_rule(scene: Scene) -> Finding:
@@ -566,7 +534,7 @@ def _axial(scene: Scene, source: str) -> Finding:
     from drillfem.stability.loop import motions
 
     rigid, whole = (growing_motions(scene, waves) for waves in (False, True))
-    passing = blade_passing(scene)
+    passing = 1 / scene.blade_passage
     axial: Any = motions(replace(scene, model="axial-torsional"))[0]
     own = modes_of(axial, BAND * passing)
     error = distance(rigid, whole)
@@ -606,13 +574,13 @@ def torsional_rule(scene: Scene) -> Finding:
 def _torsional(scene: Scene, source: str) -> Finding:
     if any(s.name == SPRING for s in scene.string):
         return Finding("torsional waves", "lumped", "none: the scene is given by numbers", {}, source, 0.0)
-    if not drills(scene):
+    if not scene.drills:
         return Finding("torsional waves", "torsional", "nothing is drilled: no lumped model", {}, source)
     if not _drilling_waves(scene):
         return Finding("torsional waves", "torsional", "there is no steady drilling to judge a spring by", {}, source)
     from drillfem.stability.loop import motions
 
-    tolerance, passing = scene.output.tolerance, blade_passing(scene)
+    tolerance, passing = scene.output.tolerance, 1 / scene.blade_passage
     torsion: Any = motions(replace(scene, model="torsional"))[1]
     lump = lumps(scene)
     alone = math.sqrt(lump.stiffness / lump.inertia) / (2 * math.pi)
@@ -671,7 +639,7 @@ def findings(scene: Scene) -> tuple[Finding, ...]:
     """What all rules say about a scene. Those about waves are left out where the string does not stay straight."""
     found = [rule(scene) for rule in (hole_rule, side_load_rule, buckling_rule, output_rule)]
     if all(rank(f.needs) < rank("planar") for f in found[:3]) and not obstacle(scene, "torsional"):
-        found += [axial_rule(scene), torsional_rule(scene)] if drills(scene) else []
+        found += [axial_rule(scene), torsional_rule(scene)] if scene.drills else []
     return tuple(found)
 
 
@@ -701,7 +669,7 @@ def lowest(scene: Scene) -> ModelChoice:
     if rank(needs) >= rank("planar"):
         return ModelChoice(name, "; ".join(f"{f.rule}: {f.text}" for f in decisive))
     said = [f"{f.rule}: {f.text}" for f in decisive if f.rule in ("axial waves", "torsional waves", "wanted outputs")]
-    if not drills(scene):
+    if not scene.drills:
         said = [f"{f.rule}: {f.text}" for f in decisive if scene.output.wanted]
     return ModelChoice(name, "; ".join(["the string is straight and nothing bends it", *said]))
 

@@ -179,7 +179,7 @@ def describe(scene: Scene) -> list[tuple[str, str]]:
         rows.append(("first torsional frequency", f"{torsional_frequency(scene):.4g} Hz"))
     if scene.bit is not None:
         rows += [("hook load", f"{n.hook_load / 1e3:.6g} kN"), ("weight on bit", q(n.weight_on_bit, "N"))]
-    if scene.bit is not None and scene.bit.kind == "cutting":
+    if scene.bit is not None and scene.drills:
         d = dimensionless(scene)
         rows += [
             ("nominal depth of cut", f"{q(n.depth_of_cut, 'm')} per turn, all {scene.bit.blades} blades"),
@@ -189,7 +189,7 @@ def describe(scene: Scene) -> list[tuple[str, str]]:
             ),
             ("nominal torque on bit", q(n.torque_on_bit, "N m")),
             ("nominal power", q(n.torque_on_bit * (scene.top_drive.speed or 0.0), "W")),
-            ("blade passages", f"{scene.bit.blades * (scene.top_drive.speed or 0.0) / (2 * math.pi):.4g} Hz"),
+            ("blade passages", f"{1 / scene.blade_passage:.4g} Hz"),
             (
                 "two-degree-of-freedom equivalent",
                 f"C {d.torsional_stiffness:.2f} N m/rad, I {d.inertia:.2f} kg m², "

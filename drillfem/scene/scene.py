@@ -135,6 +135,18 @@ class Scene:
         """Weight along e3 in N of the string with the lumps at its ends."""
         return self.mass * self.gravity.magnitude * self.gravity.direction[2]
 
+    @property
+    def drills(self) -> bool:
+        """Whether there is a bit that cuts."""
+        return self.bit is not None and self.bit.kind == "cutting"
+
+    @property
+    def blade_passage(self) -> float:
+        """Time between two blades (s) at the speed of the top; infinite where nothing is cut."""
+        if self.bit is None or not self.drills or not self.top_drive.speed:
+            return math.inf
+        return 2 * math.pi / (self.bit.blades * abs(self.top_drive.speed))
+
     def nominal(self) -> Nominal:
         """Steady drilling (5-25)-(5-28); zero depth of cut and torque without a cutting bit."""
         return nominal(self)
@@ -211,7 +223,7 @@ class Scene:
 
     def _drilling_problems(self) -> Iterator[tuple[str, str]]:
         drive, bit, rock = self.top_drive, self.bit, self.rock
-        if self.inertia.distributed != 1 and (bit is None or bit.kind != "cutting"):
+        if self.inertia.distributed != 1 and not self.drills:
             yield "inertia.distributed", "must be 1 where there is no cutting bit to lump inertia at"
         if bit is None:
             if drive.weight_on_bit is not None:
@@ -276,10 +288,9 @@ class Scene:
             yield "output.interval", f"must be a whole multiple of time.step = {time.step:g} s"
         if output.checkpoint_interval < time.step:
             yield "output.checkpoint_interval", f"must not be shorter than time.step = {time.step:g} s"
-        if self.bit is not None and self.bit.kind == "cutting" and self.top_drive.speed:
-            passage = 2 * math.pi / (self.bit.blades * abs(self.top_drive.speed))
-            if time.step > passage / 8:
-                yield "time.step", f"must be at most {passage / 8:.2g} s, an eighth of the time between two blades"
+        if time.step > self.blade_passage / 8:
+            most = self.blade_passage / 8
+            yield "time.step", f"must be at most {most:.2g} s, an eighth of the time between two blades"
         if output.interval > time.end - time.start:
             yield "output.interval", f"must not exceed the run of {time.end - time.start:g} s"
         if output.fields_interval < output.interval * (1 - 1e-9):
@@ -302,8 +313,8 @@ class Scene:
     @property
     def condensable(self) -> bool:
         """Whether the string is linear but for its bit, so that the condensed engine can run it."""
-        cutting = self.bit is not None and self.bit.kind == "cutting" and self.time.analysis == "dynamic"
-        return cutting and self.resolved_model().name in ("lumped", "torsional", "axial-torsional")
+        dynamic = self.drills and self.time.analysis == "dynamic"
+        return dynamic and self.resolved_model().name in ("lumped", "torsional", "axial-torsional")
 
     @property
     def engines(self) -> tuple[str, ...]:

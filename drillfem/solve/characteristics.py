@@ -32,6 +32,7 @@ from drillfem.bitrock.jit import kernel
 from drillfem.bitrock.law import C3, EPS1, FLAT, GAMMA, MU, RADIUS, SIGMA2, BitLaw
 from drillfem.bitrock.surface import RockSurface, SurfaceData
 from drillfem.models.straight import Channel
+from drillfem.scene.frequencies import End, Uniform, standing_waves
 from drillfem.solve.condensed import (
     ACC,
     AT_ONCE,
@@ -553,25 +554,10 @@ class CharacteristicString:
     @property
     def frequencies(self) -> tuple[F8, ...]:
         """Natural frequencies, Hz: of the axial motion (free), and the exact ones of torsion up to 0.05 per step."""
-        travel = self._counts * self.internal_step
-
-        def left_over(omega: F8) -> F8:
-            """Torque left at the bit when the top is held; positive before the first root."""
-            angle, torque = np.zeros_like(omega), np.ones_like(omega)
-            for t, z in zip(travel, self._impedance, strict=True):
-                c, s = np.cos(omega * t), np.sin(omega * t)
-                angle, torque = angle * c + torque * s / (z * omega), torque * c - angle * s * z * omega
-            return torque - omega**2 * self.bit_inertia * angle
-
-        omega = np.arange(0.01 / travel.sum(), 0.1 * np.pi / self.internal_step, 0.01 / travel.sum())
-        sign = left_over(omega) > 0
-        at = np.flatnonzero(sign[1:] != sign[:-1])
-        low, high, rising = omega[at], omega[at + 1], sign[at]
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            same = (left_over(middle) > 0) == rising
-            low, high = np.where(same, middle, low), np.where(same, high, middle)
-        return np.zeros(1), np.asarray(0.25 * (low + high) / np.pi, np.float64)
+        # pieces of unit wave speed: as long as the travel times of the march, with the impedances
+        pieces = [Uniform(t, z, z) for t, z in zip(self._counts * self.internal_step, self._impedance, strict=True)]
+        torsion = standing_waves(pieces, End(True), End(False, self.bit_inertia), 0.05 / self.internal_step)
+        return np.zeros(1), np.array(torsion)
 
     def nominal(self) -> tuple[F8, F8]:
         """Nodal displacement (m) and twist (rad) of steady drilling, both zero at the top (spec 8.3)."""

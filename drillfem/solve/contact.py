@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from ..bitrock.jit import announce
 from ..bitrock.law import BitLaw
 from ..bitrock.solve import bit_step
 from ..bitrock.surface import RockSurface
+from ..models.straight import have_forms
 from ..scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -36,8 +36,8 @@ def surface_of(scene: Scene) -> RockSurface:
     bit, rock = scene.bit, scene.rock
     assert bit is not None and rock is not None
     operators = None
-    surface, here = rock.surface, find_spec("dolfinx") is not None and find_spec("petsc4py") is not None
-    if surface.scheme != "profile" and here:
+    surface = rock.surface
+    if surface.scheme != "profile" and have_forms():
         from ..models.rock import advection_operators
 
         operators = advection_operators(surface.degree, surface.elements, 2 * np.pi / bit.blades, surface.scheme)

@@ -15,14 +15,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..bitrock.dg import surface_operators
 from ..errors import SceneError
 from ..meshes.points import distribute
 from ..scene import Scene
 from ..scene.frequencies import straight_frequencies
 from ..scene.tables import Surface
 from ..stability.loop import DrillingLoop
-from ..stability.transfer import Delay, surface_delay
+from ..stability.transfer import surface_delay
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -94,10 +93,11 @@ def method_of(scene: Scene) -> Method | None:
     time = scene.time
     if time.analysis != "dynamic" or scene.engine != "petsc" or time.adaptive:
         return None
-    drilling = scene.bit is not None and scene.bit.kind == "cutting"
     kind = time.integrator
     if kind == "default":
-        return Method("theta", theta=0.5) if drilling else Method("generalized-alpha", rho_infinity=time.rho_infinity)
+        return (
+            Method("theta", theta=0.5) if scene.drills else Method("generalized-alpha", rho_infinity=time.rho_infinity)
+        )
     return Method(kind, time.order, time.theta, time.rho_infinity) if kind != "arkimex" else None
 
 
@@ -143,17 +143,6 @@ def waves(scene: Scene, most: float = math.inf) -> Waves:
 # -- before a run -----------------------------------------------------------------------------------------------------
 
 
-def _drilling(scene: Scene) -> bool:
-    return scene.bit is not None and scene.bit.kind == "cutting"
-
-
-def passage(scene: Scene) -> float:
-    """Time between two blades (s) at the speed of the top; infinite where nothing is drilled."""
-    if scene.bit is None or not _drilling(scene) or not scene.top_drive.speed:
-        return math.inf
-    return 2 * math.pi / (scene.bit.blades * abs(scene.top_drive.speed))
-
-
 def growing_waves(scene: Scene) -> Iterator[str]:
     """Waves that the integrator amplifies: BDF from order 3 on (TSBDF)."""
     method, h = method_of(scene), scene.time.step
@@ -178,7 +167,7 @@ def dying_waves(scene: Scene) -> Iterator[str]:
     if method is None:
         return
     watched = {"its slowest wave": float(waves(scene, 3).omega.min(initial=math.inf))}
-    if math.isfinite(period := passage(scene)):
+    if math.isfinite(period := scene.blade_passage):
         watched["the passage of the blades"] = 2 * math.pi / period
     left = {}
     for name, omega in watched.items():
@@ -201,7 +190,7 @@ def dying_waves(scene: Scene) -> Iterator[str]:
 def coarse_steps(scene: Scene) -> Iterator[str]:
     """Steps too long for the time between two blades."""
     wanted = PASSAGE["petsc" if scene.engine == "petsc" else "condensed"]
-    period, h = passage(scene), scene.time.step
+    period, h = scene.blade_passage, scene.time.step
     if scene.engine in PASSAGE and h > period / wanted * (1 + 1e-9):
         yield (
             f"time.step = {h:g} s leaves {period / h:.3g} steps between two blades ({period:.4g} s), the "
@@ -235,7 +224,7 @@ def locking(scene: Scene) -> Iterator[str]:
 def large_rotation(scene: Scene) -> Iterator[str]:
     """The trapezoidal rule where a rod turns as a whole: it has no damping for what it cannot resolve."""
     method = method_of(scene)
-    if scene.resolved_model().name not in ("planar", "spatial") or _drilling(scene):
+    if scene.resolved_model().name not in ("planar", "spatial") or scene.drills:
         return
     if method is None or method.kind != "theta" or method.theta != 0.5:
         return
@@ -300,7 +289,7 @@ def wear_flat_feed(scene: Scene) -> tuple[float, float]:
 
 def literal_torque(scene: Scene) -> Iterator[str]:
     """The wear-flat torque as printed."""
-    if scene.reading != "literal" or not _drilling(scene):
+    if scene.reading != "literal" or not scene.drills:
         return
     push, brake = wear_flat_feed(scene)
     speed = abs(scene.top_drive.speed or 0.0)
@@ -319,7 +308,7 @@ def self_excitation(scene: Scene, speed: Array, surface: Surface | None = None) 
     """
     loop = DrillingLoop.from_scene(scene)
     if surface is not None:
-        loop = replace(loop, delay=delay_of(surface))
+        loop = replace(loop, delay=surface_delay(surface.scheme, surface.degree, surface.elements))
     roots = loop.roots(speed, np.full_like(speed, scene.nominal().depth_of_cut / (2 * math.pi)))
     axial = ~roots.torsional & np.isfinite(roots.values)
     return np.asarray(np.where(axial, roots.values.real, -math.inf).max(axis=1))
@@ -342,35 +331,17 @@ def boundary(scene: Scene, surface: Surface | None = None) -> float:
     return low
 
 
-def delay_of(surface: Surface) -> Delay:
-    """What a discretised rock surface makes of the delay exp(-p width) of a sector, for every scheme."""
-    if surface.scheme != "supg":
-        return surface_delay(surface.scheme, surface.degree, surface.elements)
-    op = surface_operators("supg", 1, surface.elements, 1.0)
-    bands = [(np.diag(op.mass, k), np.diag(op.forward, k)) for k in (-1, 0, 1)]
-
-    def delay(p: Complex, width: float) -> Complex:
-        # (p M - F) L = left for the last height, by elimination down the nodes
-        lower, middle, upper = ([p * width * m - f for m, f in zip(*band, strict=True)] for band in bands)
-        pivot, load = middle[0], np.full_like(p, op.left[0])
-        for i in range(1, len(middle)):
-            share = lower[i - 1] / pivot
-            pivot, load = middle[i] - share * upper[i - 1], op.left[i] - share * load
-        return np.asarray(load / pivot)
-
-    return delay
-
-
 def _keeps_delay(surface: Surface) -> bool:
     """Whether a rock surface hands on the lowest waves of a sector as they are, so that nothing need be computed."""
     theta = np.linspace(0.1, 4, 40) * 1j * math.pi
-    return float(np.abs(delay_of(surface)(theta, 1.0) - np.exp(-theta)).max()) < 1e-3
+    delay = surface_delay(surface.scheme, surface.degree, surface.elements)
+    return float(np.abs(delay(theta, 1.0) - np.exp(-theta)).max()) < 1e-3
 
 
 def diffusive_surface(scene: Scene) -> Iterator[str]:
     """A rock surface whose numerical diffusion eats the delay, and the self-excitation with it."""
     rock, speed = scene.rock, scene.top_drive.speed or 0.0
-    if rock is None or not _drilling(scene) or speed <= 0 or scene.nominal().depth_of_cut <= 0:
+    if rock is None or not scene.drills or speed <= 0 or scene.nominal().depth_of_cut <= 0:
         return
     scheme = rock.surface.scheme
     if _keeps_delay(rock.surface):
@@ -392,7 +363,7 @@ def diffusive_surface(scene: Scene) -> Iterator[str]:
 def digging_bit(scene: Scene) -> Iterator[str]:
     """A weight on bit above what the wear flats carry at rest: the law (5-5)-(5-7) lets a stalled bit sink freely."""
     bit, rock = scene.bit, scene.rock
-    if not _drilling(scene) or bit is None or rock is None:
+    if not scene.drills or bit is None or rock is None:
         return
     carried = rock.contact_strength_stalled * bit.radius * bit.wear_flat_length
     weight = scene.nominal().weight_on_bit

@@ -77,8 +77,8 @@ def simulate(
 
     scene: what to simulate. out: new folder for the result, or None to keep it in memory. progress: called with
     (time reached, time of the end, simulated seconds per wall second). until: stop at this time (s) rather than at
-    ``time.end``. warn: log what is known to go wrong with the scene (`drillfem.solve.guards`), and an energy balance that
-    does not close.
+    ``time.end``. warn: log what is known to go wrong with the scene (`drillfem.solve.guards`), and an energy balance
+    that does not close.
 
     Raises SceneError (bad input; nothing is written) and SimulationError (what was computed is kept in ``out``).
     """
@@ -120,4 +120,4 @@ def certify(scene: Scene, until: float | None = None, starts: int = 4) -> dict[s
         nearby = replace(scene.initial, seed_perturbation=1e-3, seed=k)
         runs[f"start {k}"] = replace(scene, initial=nearby).checked()
     # what is wrong with the scene has been said about the run that these certify
-    return {name: _run(s, None, until, None, resume=False, warn=False) for name, s in runs.items()}
+    return {name: simulate(s, until=until, warn=False) for name, s in runs.items()}

@@ -89,7 +89,7 @@ class DrillingLoop:
         linear motions of the axial-torsional one.  Raises SceneError.
         """
         bit, rock = scene.bit, scene.rock
-        if bit is None or rock is None or bit.kind != "cutting":
+        if bit is None or rock is None or not scene.drills:
             raise SceneError("bit.kind: must be 'cutting' for a stability map: nothing else feeds a self-excitation")
         if not scene.top_drive.speed or scene.top_drive.speed < 0:
             raise SceneError(f"top_drive.speed = {scene.top_drive.speed}: must be > 0 rad/s for a stability map")

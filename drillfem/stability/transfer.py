@@ -17,6 +17,8 @@ from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 from scipy.interpolate import pade
 
+from drillfem.scene.frequencies import End, Uniform, standing_waves
+
 F8 = NDArray[np.float64]
 C16 = NDArray[np.complex128]
 
@@ -94,32 +96,10 @@ class Waves:
         return _damped(self.frequencies(limit), float(late))
 
     def frequencies(self, limit: float) -> F8:
-        """Undamped natural frequencies in rad/s, ascending, > 0 and <= limit; by a phase that rises with frequency."""
-        low = 1 if not self.held else 0
-        last = int(np.floor(self._phase(np.array([limit]))[0] / np.pi + 1e-12))
-        target = np.pi * np.arange(low, last + 1)
-        a, b = np.zeros_like(target), np.full_like(target, limit)
-        for _ in range(60):
-            middle = 0.5 * (a + b)
-            under = self._phase(middle) < target
-            a, b = np.where(under, middle, a), np.where(under, b, middle)
-        return np.asarray(0.5 * (a + b))
-
-    def _phase(self, omega: F8) -> F8:
-        """Angle psi of u = A cos psi, F = -A Z omega sin psi at the bottom; a multiple of pi at natural frequencies."""
-
-        def tangent(psi: F8, change: Callable[[F8], F8]) -> F8:
-            turns = np.pi * np.round(psi / np.pi)
-            return turns + np.arctan(change(np.tan(psi - turns)))
-
-        waves = [np.sqrt(k * m) for k, m in zip(self.stiffness, self.inertia, strict=True)]
-        psi = np.full_like(omega, -np.pi / 2) if self.held else np.arctan(self.top * omega / waves[0])
-        before = waves[0]
-        for length, stiffness, inertia, z in zip(self.length, self.stiffness, self.inertia, waves, strict=True):
-            psi = tangent(psi, lambda x, r=before / z: r * x)  # type: ignore[misc]
-            psi = psi + omega * length * np.sqrt(inertia / stiffness)
-            before = z
-        return tangent(psi, lambda x: x + self.bottom * omega / before)
+        """Undamped natural frequencies in rad/s, ascending, > 0 and <= limit."""
+        pieces = [Uniform(*piece) for piece in zip(self.length, self.stiffness, self.inertia, strict=True)]
+        ends = End(self.held, self.top), End(False, self.bottom)
+        return 2 * np.pi * np.array(standing_waves(pieces, *ends, limit / (2 * np.pi)))
 
 
 def _damped(omega: F8, late: float) -> C16:

@@ -13,7 +13,8 @@ import drillfem
 from drillfem.bitrock.dg import surface_operators
 from drillfem.errors import SceneError, SimulationError
 from drillfem.scene import builtin_scenes, load_scene
-from drillfem.solve.guards import RUNAWAY, Method, delay_of, refuse, runaway, warnings
+from drillfem.solve.guards import RUNAWAY, Method, refuse, runaway, warnings
+from drillfem.stability.transfer import surface_delay
 
 RPM = math.pi / 30
 
@@ -102,7 +103,8 @@ def test_delay_of_a_surface_is_that_of_its_operators(scheme: str, degree: int) -
     rate, inflow = op.rate()
     by_operators = [op.right @ np.linalg.solve(x * np.eye(len(inflow)) - rate, inflow) for x in p]
     surface = surface_scene(14.42, 12, scheme, degree).rock.surface
-    np.testing.assert_allclose(delay_of(surface)(p, 0.7), by_operators, rtol=1e-10)
+    delay = surface_delay(surface.scheme, surface.degree, surface.elements)
+    np.testing.assert_allclose(delay(p, 0.7), by_operators, rtol=1e-10)
 
 
 def test_guard_is_silent_about_surfaces_that_keep_the_delay() -> None:

@@ -23,7 +23,6 @@ from drillfem.scene.ladder import (
     Growing,
     axial_rule,
     bend_of,
-    blade_passing,
     buckling_rule,
     critical_weight,
     distance,
@@ -313,7 +312,7 @@ def test_the_quick_search_finds_the_certified_roots(alpha: float, cd: str) -> No
     loop = DrillingLoop.from_scene(scene)
     rho = pitch(scene, np.array([scene.nominal().weight_on_bit]))
     certified = loop.roots(np.array([14.42]), rho).values[0]
-    limit = 1.5 * blade_passing(scene)
+    limit = 1.5 / scene.blade_passage
     certified = certified[(certified.real > 0) & (certified.imag < 2 * np.pi * limit)]
     least = max(0.05 * certified.real.max(), 1 / 200)
     expected = sorted((z.imag / (2 * np.pi), z.real) for z in certified if z.real > least)
