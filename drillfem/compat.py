@@ -148,6 +148,13 @@ def discontinuous(mesh: dolfinx.mesh.Mesh, degree: int, size: int | None = None)
     )
 
 
+def quadrature_field(mesh: dolfinx.mesh.Mesh, degree: int, size: int) -> tuple[dolfinx.fem.Function, Array]:
+    """A field of ``size`` numbers known at the points of a rule alone, and its block of every point (cells, points)."""
+    element = basix.ufl.quadrature_element("interval", value_shape=(size,), degree=degree)
+    V = dolfinx.fem.functionspace(mesh, element)
+    return dolfinx.fem.Function(V), V.dofmap.list
+
+
 def reference_nodes(V: dolfinx.fem.FunctionSpace) -> Array:
     """Reference points (n, 1) of the nodes of a space: a method in 0.9, a property later."""
     points = V.element.interpolation_points

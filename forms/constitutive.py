@@ -21,7 +21,7 @@ SECTION = (
     "inertia1",  # rho I_1 (kg m)
     "inertia2",  # rho I_2 (kg m)
     "retardation",  # c_d (s)
-    "outer_radius",  # r_ext (m)
+    "contact_radius",  # r_ext, of what touches the wall (m)
 )
 
 

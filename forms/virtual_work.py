@@ -15,7 +15,8 @@ from ufl.core.expr import Expr
 
 from .ansatz import Ansatz
 from .constitutive import Section, elastic_resultants, viscous_resultants
-from .kinematics import Configuration, Twist, strain_rates, strains
+from .kinematics import E3, Configuration, Twist, strain_rates, strains
+from .wall import Hole, Wall, contact, friction
 
 Terms = dict[str, ufl.Form]
 
@@ -56,20 +57,16 @@ class EndLoad:
 
 
 @dataclass(frozen=True)
-class Wall:
-    """Straight round hole along e3 with penalty contact and regularised Coulomb friction (spec 5).
+class BitLoad:
+    """Load of the rock on the bit: ``weight`` (N) against the hole's direction, ``torque`` (N m) against the spin.
 
-    ``clearance_radius``: hole radius (m); stiffness k_s (N/m2); static and dynamic friction; velocity scale n (s/m);
-    regularisation eps. ``projected``: friction along the wall only (else the literal, unprojected velocity).
+    ``hole``: piece of a hole that bends, on whose centreline a spring ``guide`` (N/m) holds the bit; None: along e3.
     """
 
-    hole_radius: Expr
-    stiffness: Expr
-    friction_static: Expr
-    friction_dynamic: Expr
-    velocity_scale: Expr
-    regularisation: Expr
-    projected: bool = True
+    weight: Expr
+    torque: Expr
+    hole: Hole | None = None
+    guide: Expr | None = None
 
 
 def spin_rate(Theta: Expr, twist: Twist, rate: Twist) -> Expr:
@@ -82,47 +79,6 @@ def inertia(twist: Twist, rate: Twist, virtual: Twist, section: Section) -> Expr
     return section["mass"] * ufl.dot(rate.v, virtual.v) + ufl.dot(spin_rate(section.Theta, twist, rate), virtual.w)
 
 
-def _radial(x: Configuration) -> tuple[Expr, Expr]:
-    """Offset from the axis of a straight hole: vector (3) and length, without 0/0 on the axis."""
-    offset = ufl.as_vector((x.r[0], x.r[1], 0))
-    return offset, ufl.sqrt(ufl.dot(offset, offset) + 1e-24)
-
-
-def wall_pressure(x: Configuration, section: Section, wall: Wall) -> Expr:
-    """Normal force per length k_s max(0, |r_r| - clearance) (4-5), (4-6)."""
-    _, distance = _radial(x)
-    return wall.stiffness * ufl.max_value(0.0, distance - (wall.hole_radius - section["outer_radius"]))
-
-
-def friction_coefficient(speed: Expr, wall: Wall) -> Expr:
-    """mu-tilde = k_fr/|v_c| of (4-7), (4-9) (spec 5.3); its product with |v_c| peaks at friction_static."""
-    n, mu_s, mu_d = wall.velocity_scale, wall.friction_static, wall.friction_dynamic
-    alpha = ufl.sqrt(mu_s * (mu_s - mu_d))
-    return (mu_d * ufl.sqrt(speed**2 + wall.regularisation / n**2) + 2 * alpha / n) / (speed**2 + 1 / n**2)
-
-
-def contact(x: Configuration, virtual: Twist, section: Section, wall: Wall) -> Expr:
-    """Virtual work of the wall's normal force, per length (arm and force are parallel: no moment)."""
-    offset, distance = _radial(x)
-    return wall_pressure(x, section, wall) * ufl.dot(offset, virtual.v) / distance
-
-
-def friction(x: Configuration, twist: Twist, virtual: Twist, section: Section, wall: Wall) -> Expr:
-    """Virtual work of the wall friction on the touching point, per length (4-7)-(4-12)."""
-    offset, distance = _radial(x)
-    normal = offset / distance
-    arm = section["outer_radius"] * normal
-
-    def touching_point(t: Twist) -> Expr:
-        return t.v + ufl.cross(x.R * t.w, arm)
-
-    v_c = touching_point(twist)
-    if wall.projected:
-        v_c = v_c - ufl.dot(v_c, normal) * normal
-    mu = friction_coefficient(ufl.sqrt(ufl.dot(v_c, v_c) + 1e-24), wall)
-    return wall_pressure(x, section, wall) * mu * ufl.dot(v_c, touching_point(virtual))
-
-
 def end_load(x: Configuration, twist: Twist, rate: Twist, virtual: Twist, load: EndLoad) -> Expr:
     """Virtual work at an end: applied load and the inertia of what is attached there."""
     applied = ufl.dot(load.force, virtual.v) + ufl.dot(load.moment, x.R * virtual.w)
@@ -130,9 +86,16 @@ def end_load(x: Configuration, twist: Twist, rate: Twist, virtual: Twist, load: 
     return load.mass * ufl.dot(rate.v, virtual.v) + turning - applied
 
 
-def bit_load(x: Configuration, virtual: Twist, tangent: Expr, weight: Expr, torque: Expr) -> Expr:
-    """Virtual work of the rock on the bit: force -W t, moment -T t along the hole's tangent (errata 49)."""
-    return weight * ufl.dot(tangent, virtual.v) + torque * ufl.dot(tangent, x.R * virtual.w)
+def bit_load(x: Configuration, virtual: Twist, bit: BitLoad) -> Expr:
+    """Virtual work of the rock on the bit: force -W t along the hole, moment -T d3 about the bit (errata 49, 50).
+
+    The torque is about the bit's own axis, whose spin d3 . w the law takes (7.1).
+    """
+    work = bit.torque * virtual.w[2]
+    if bit.hole is None or bit.guide is None:
+        return work + bit.weight * ufl.dot(E3, virtual.v)
+    force = bit.weight * bit.hole.tangent(x.r) + bit.guide * bit.hole.offset(x.r)
+    return work + ufl.dot(force, virtual.v)
 
 
 @dataclass(frozen=True)
@@ -145,13 +108,13 @@ class Lump:
 
 @dataclass(frozen=True)
 class Loads:
-    """What acts on the rod besides itself. ``bit`` = (tangent, weight, torque); absent parts are None."""
+    """What acts on the rod besides itself; absent parts are None."""
 
     g: Expr
     u0: Expr
     top: EndLoad
     bottom: EndLoad
-    bit: tuple[Expr, Expr, Expr] | None = None
+    bit: BitLoad | None = None
     wall: Wall | None = None
     lump: Lump | None = None
 
@@ -188,10 +151,11 @@ def virtual_work(
     if loads.lump is not None:
         terms["lumped inertia"] = end_load(x, twist, rate, virtual, loads.lump.attached) * on.bottom
     if loads.wall is not None:
-        terms["contact"] = contact(x, virtual, section, loads.wall) * on.wall
-        terms["friction"] = friction(x, twist, virtual, section, loads.wall) * on.wall
+        radius = section["contact_radius"]
+        terms["contact"] = contact(x, virtual, radius, loads.wall) * on.wall
+        terms["friction"] = friction(x, twist, virtual, radius, loads.wall) * on.wall
     if loads.bit is not None:
-        terms["bit"] = bit_load(x, virtual, *loads.bit) * on.bottom
+        terms["bit"] = bit_load(x, virtual, loads.bit) * on.bottom
     return terms
 
 
@@ -228,17 +192,28 @@ def powers(
 
 
 def static_terms(
-    a: Ansatz, x: Expr, test: Expr, s: Expr, section: Section, loads: Loads, on: Measures, literal: bool = False
+    a: Ansatz,
+    x: Expr,
+    test: Expr,
+    s: Expr,
+    section: Section,
+    loads: Loads,
+    on: Measures,
+    literal: bool = False,
+    support: Expr | None = None,
 ) -> Terms:
     """Equilibrium in the configuration fields alone; x, test of shape (len(a.x_names),).
 
     The ansatz' constraint (|q| = 1 at every node) closes the system; its rows carry the torsional stiffness, to have
     the size of the others. It is no penalty: where |q| may differ between nodes, the rotation between them swerves.
+    ``support`` (N/m2): springs to the hole's centreline, for a solver that lets them go step by step.
     """
     at = a.configuration(x, s)
     still = Twist(0 * at.r, 0 * at.u_m)
     terms = virtual_work(at, still, still, a.virtual(test), section, loads, on, literal)
     g = a.constraint(x, test)
+    if support is not None and loads.wall is not None:
+        terms["support"] = support * ufl.dot(loads.wall.offset(at.r), a.virtual(test).v) * on.wall
     if g is not None:
         terms["constraint"] = section["torsion"] * g * on.nodal
     return terms

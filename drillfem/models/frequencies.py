@@ -21,7 +21,7 @@ def natural_frequencies_of(scene: Scene, upto: float = 40.0) -> dict[str, list[f
     if scene.time.analysis == "static":
         return {}
     model = scene.resolved_model().name
-    if scene.drills or model in ("lumped", "torsional", "axial-torsional"):
+    if scene.drills or model in ("lumped", "torsional", "axial-torsional", "soft-string"):
         return straight_frequencies(scene, upto)
     try:
         from .modes import natural_frequencies

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +13,7 @@ import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..boreholes.closest import closest
 from ..compat import (
     Array,
     MatrixForm,
@@ -26,10 +28,13 @@ from ..compat import (
 from ..forms import virtual_work as vw
 from ..forms.ansatz import Ansatz, Spatial, ansatz
 from ..forms.constitutive import SECTION, Section, elastic_resultants, viscous_resultants
+from ..forms.kinematics import Twist
+from ..forms.wall import Hole, Wall, friction
 from ..meshes.string import BOTTOM, TOP, StringMesh, string_mesh
 from ..scene import Scene
 from ..scene.nominal import lumped_at_bit
 from .steady import outer_diameter
+from .wall import WallPoints
 
 #: Velocity components that an end condition holds; the spin of a driven top is imposed by the drive instead.
 _HELD = {
@@ -61,7 +66,7 @@ def section_table(scene: Scene) -> Array:
                 section.rotary_inertia * share,
                 section.rotary_inertia * share,
                 section.retardation_time,
-                (section.outer_diameter or 0.0) / 2,
+                section.contact_radius,
             ]
         )
     return np.array(rows)
@@ -117,7 +122,11 @@ class Rod:
 
     Unknowns ``u`` have one block of ``ansatz.size`` entries per node; ``nodes`` lists the nodes from the top down.
     ``weight`` and ``torque`` (the rock's load on the bit) are set by whoever solves: the law is not part of the form.
+    ``vector_form``, ``scalar_form``: who assembles; to be set before the first evaluation.
     """
+
+    vector_form: Callable[[ufl.Form], Any] = VectorForm
+    scalar_form: Callable[[ufl.Form], Any] = ScalarForm
 
     def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_SELF) -> None:
         if comm.size > 1:
@@ -141,6 +150,12 @@ class Rod:
         self.weight, self.torque = self.constant(0.0), self.constant(0.0)
         #: load of the rock on the bit: weight (N), torque (N m); change it by :meth:`set_bit_load`
         self.bit_load: Array = np.zeros(2)
+        self.wall = self._wall()
+        #: piece of the hole's centreline at the bit, where the hole bends; unit tangent of the hole there (3,)
+        self.bit_hole = self.constant(np.zeros(9))
+        self.bit_hole.value[3:6] = 0.0, 0.0, 1.0
+        self.bit_tangent: Array = np.array([0.0, 0.0, 1.0])
+        self.bit_measured_depth = self.length
         self.tip_force = self.constant(scene.ends.tip_force)
         self.tip_moment = self.constant(scene.ends.tip_moment)
         self.shift = self.constant(1.0)
@@ -157,9 +172,9 @@ class Rod:
             self.literal,
         )
         self.held, self.driven = self._conditions()
-        self._constrained = np.array(sorted([*self.held, *self.driven]), dtype=np.int32)
+        self.constrained = np.array(sorted([*self.held, *self.driven]), dtype=np.int32)
         #: raw residual at the constrained dofs: the reactions of the last evaluation
-        self.reaction: Array = np.zeros(len(self._constrained))
+        self.reaction: Array = np.zeros(len(self.constrained))
 
     # -- what acts ---------------------------------------------------------------------------------------------------
 
@@ -171,23 +186,28 @@ class Rod:
         scene, ends, c = self.scene, self.scene.ends, self.constant
         hook_load = scene.nominal().hook_load if scene.drills else 0.0
         wall = None
-        if scene.contact is not None and scene.hole.diameter and self.model in ("spatial", "planar"):
+        if self.wall is not None and scene.contact is not None:
             k = scene.contact
-            wall = vw.Wall(
-                c(scene.hole.diameter / 2),
-                c(k.stiffness),
-                c(k.friction_static),
-                c(k.friction_dynamic),
-                c(k.friction_velocity_scale),
-                c(k.friction_regularisation),
+            wall = Wall(
+                self.wall.field,
+                stiffness=c(k.stiffness),
+                smoothing=c(k.smoothing),
+                velocity_scale=c(k.friction_velocity_scale),
+                regularisation=c(k.friction_regularisation),
+                method=k.method,
                 projected=k.projected and not self.literal,
             )
+        bit = None
+        if self.has_bit:
+            bit = vw.BitLoad(self.weight, self.torque)
+            if self.bends and scene.bit is not None:
+                bit = replace(bit, hole=Hole(self.bit_hole), guide=c(scene.bit.guide_stiffness))
         return vw.Loads(
             g=c(np.asarray(scene.gravity.direction) * scene.gravity.magnitude),
             u0=c(self._stress_free_curvature()),
             top=vw.EndLoad(c((0.0, 0.0, -hook_load)), c((0.0, 0.0, 0.0)), c(ends.top_mass), c(ends.top_inertia)),
             bottom=vw.EndLoad(self.tip_force, self.tip_moment, c(ends.bottom_mass), c(ends.bottom_inertia)),
-            bit=(c((0.0, 0.0, 1.0)), self.weight, self.torque) if self.has_bit else None,
+            bit=bit,
             wall=wall,
             lump=self._lump(),
         )
@@ -199,6 +219,27 @@ class Rod:
         mass, inertia = lumped_at_bit(self.scene)
         at_bit = vw.EndLoad(c((0.0, 0.0, 0.0)), c((0.0, 0.0, 0.0)), c(mass), c(inertia))
         return vw.Lump(c(alpha), at_bit)
+
+    def _wall(self) -> WallPoints | None:
+        scene, hole, contact = self.scene, self.scene.borehole, self.scene.contact
+        if hole is None or contact is None or self.model not in ("spatial", "planar"):
+            return None
+        radius = section_table(scene)[:, SECTION.index("contact_radius")][self.string.cells.values]
+        friction = np.array([contact.friction_static, contact.friction_dynamic])
+        by_cell = np.empty_like(radius)
+        by_cell[self.string.cells.indices] = radius
+        axes = (0, 1, 2) if self.model == "spatial" else (0, 2)
+        return WallPoints(self.V, hole, by_cell, friction, self.wall_degree, axes)
+
+    @property
+    def wall_degree(self) -> int:
+        """Degree of the rule that integrates contact."""
+        return 2 * self.scene.mesh.degree
+
+    @property
+    def bends(self) -> bool:
+        """Whether the string lies in a hole that leaves the axis e3."""
+        return self.wall is not None and self.scene.hole.bends
 
     @property
     def has_bit(self) -> bool:
@@ -232,13 +273,29 @@ class Rod:
                 driven |= {self.dof(node, n): x for n, x in turning.items() if n in names}
                 fixed = ["v1", "v2", "w1", "w2", "w3"] + ([] if self.has_bit else ["v3"])
                 held += [self.dof(node, n) for n in fixed if n in names and n not in turning]
-            else:
+            elif not (kind == "bit" and self.bends):  # there the hole guides it
                 held += [self.dof(node, n) for n in _HELD[kind] if n in names]
         return held, driven
 
+    @property
+    def turns(self) -> bool:
+        """Whether the lower end has a spin of its own to follow: it drills, or hangs in a hole."""
+        return self.has_bit or (self.wall is not None and self.model == "spatial")
+
+    def end_motion(self, u: Array) -> tuple[float, float, float]:
+        """Measured depth (m), speed along the hole (m/s) and spin (rad/s) of the lower end in a state.
+
+        The depth is that of the last :meth:`find_hole` where the hole bends, else the end's coordinate.
+        """
+        at = self.bit
+        if not self.bends:
+            return float(u[at.depth]), float(u[at.speed]), float(u[at.spin])
+        first = self.dof(-1, "v1")
+        return self.bit_measured_depth, float(u[first : first + 3] @ self.bit_tangent), float(u[at.spin])
+
     @cached_property
     def bit(self) -> BitDofs:
-        """Where the bit's motion stands in u (drilling ansätze)."""
+        """Where the motion of the lower end stands in u (ansätze that turn about the axis)."""
         if "q_a" in self.ansatz.x_names:
             first = self.dof(-1, "q_a")
             rotation: slice | int = slice(first, first + 4)
@@ -250,26 +307,48 @@ class Rod:
 
     @cached_property
     def _residual(self) -> VectorForm:
-        return VectorForm(vw.total(self.terms))
+        return self.vector_form(vw.total(self.terms))
 
     @cached_property
     def _residual_off_wall(self) -> VectorForm:
         """The residual without contact and friction: the same numbers, off the wall, for half of the work."""
-        return VectorForm(vw.total({k: v for k, v in self.terms.items() if k not in ("contact", "friction")}))
+        return self.vector_form(vw.total({k: v for k, v in self.terms.items() if k not in ("contact", "friction")}))
 
     @cached_property
     def _jacobian(self) -> MatrixForm:
+        return MatrixForm(self.tangent)
+
+    @property
+    def tangent(self) -> ufl.Form:
+        """dF/du + shift dF/du-dot, without end conditions."""
         F, trial = vw.total(self.terms), ufl.TrialFunction(self.V)
-        return MatrixForm(ufl.derivative(F, self.u, trial) + self.shift * ufl.derivative(F, self.u_dot, trial))
+        return ufl.derivative(F, self.u, trial) + self.shift * ufl.derivative(F, self.u_dot, trial)
 
     def create_matrix(self) -> PETSc.Mat:
         """Matrix for :meth:`jacobian`."""
         return self._jacobian.create()
 
     def set_state(self, u: Array, u_dot: Array) -> None:
-        """Copy a state into the coefficients of the forms."""
+        """Copy a state into the coefficients of the forms, and find the hole around it."""
         self._u[:] = u
         self._u_dot[:] = u_dot
+        self.find_hole(self._u)
+
+    def find_hole(self, u: Array, size: int = 0) -> None:
+        """Closest points of the hole to a state: ``size`` entries per node, position first (default: unknowns)."""
+        if self.wall is None:
+            return
+        self.wall.update(u, size)
+        if not self.bends:
+            return
+        hole, at = self.wall.hole, int(self.nodes[-1]) * (size or self.ansatz.size)
+        p = np.array([self.bit_measured_depth])
+        closest(hole.table, u[None, at : at + 3], p)
+        frame = hole.frame(p[0])
+        # the law feels a nanometre, at which the search stops: the rest of the way is linear
+        self.bit_measured_depth = float(p[0] + frame.tangent[0] @ (u[at : at + 3] - frame.position[0]))
+        self.bit_hole.value[:] = np.concatenate([frame.position[0], frame.tangent[0], frame.curvature[0]])
+        self.bit_tangent[:] = frame.tangent[0]
 
     def set_bit_load(self, weight: float, torque: float) -> None:
         """Load of the rock on the bit: ``weight`` (N, up), ``torque`` (N m, against the drilling direction)."""
@@ -280,9 +359,10 @@ class Rod:
     def residual(self, t: float, u: Array, u_dot: Array, out: Array) -> None:
         """F(t, u, u-dot), shape (dofs,); end conditions replace the momentum rows of their dofs."""
         self.set_state(u, u_dot)
-        near = self.loads.wall is None or self._near_wall()
-        (self._residual if near else self._residual_off_wall)(out)
-        rows = self._constrained
+        (self._residual if self._near_wall() else self._residual_off_wall)(out)
+        if self.wall is not None and self.wall.trouble:
+            out[:] = np.nan  # no step ends here
+        rows = self.constrained
         self.reaction[:] = out[rows]
         out[rows] = u[rows]
         if self.driven:
@@ -295,11 +375,11 @@ class Rod:
         self.set_state(u, u_dot)
         self.shift.value = shift
         self._jacobian(matrix)
-        matrix.zeroRows(self._constrained, diag=1.0)
+        matrix.zeroRows(self.constrained, diag=1.0)
 
     @cached_property
     def _bit_term(self) -> VectorForm:
-        return VectorForm(self.terms["bit"])
+        return self.vector_form(self.terms["bit"])
 
     def bit_load_vectors(self) -> Array:
         """dF/d(weight) and dF/d(torque) at the present state, shape (2, dofs): the bit's term is linear in its load."""
@@ -308,8 +388,17 @@ class Rod:
             self.set_bit_load(*unit)
             self._bit_term(vector)
         self.set_bit_load(*load)
-        vectors[:, self._constrained] = 0.0
+        vectors[:, self.constrained] = 0.0
         return vectors
+
+    def seek_hole(self, u: Array) -> None:
+        """Closest points of a state that may be far from the last one."""
+        if self.wall is None:
+            return
+        self.wall.seek(u)
+        first = self.dof(-1, "r1")
+        self.bit_measured_depth = float(self.wall.hole.nearest(u[None, first : first + 3])[0])
+        self.find_hole(u)
 
     @property
     def size(self) -> int:
@@ -318,7 +407,7 @@ class Rod:
 
     def top_torque(self) -> float:
         """Torque of the drive on the string (N m) at the last residual."""
-        rows = self._constrained
+        rows = self.constrained
         return float(sum(x * self.reaction[np.searchsorted(rows, dof)] for dof, x in self.driven.items()))
 
     def end_power(self) -> float:
@@ -347,14 +436,14 @@ class Rod:
     @cached_property
     def _powers(self) -> dict[str, ScalarForm]:
         terms = vw.powers(self.ansatz, self.u, self.u_dot, self.s, self.section, self.loads, self.on, self.literal)
-        power = {"damping": ScalarForm(terms["damping"])}
+        power = {"damping": self.scalar_form(terms["damping"])}
         if self.loads.wall is not None:
-            power["wall"] = ScalarForm(terms["contact"] + terms["friction"])
+            power["wall"] = self.scalar_form(terms["contact"] + terms["friction"])
         return power
 
     def gravity_vector(self) -> Array:
         """Virtual work of gravity in every dof (dofs,), on the left-hand side: minus the nodal weights."""
-        return VectorForm(self.terms["gravity"])(np.zeros(self.size))
+        return self.vector_form(self.terms["gravity"])(np.zeros(self.size))
 
     @cached_property
     def _weight_vector(self) -> Array:
@@ -367,30 +456,45 @@ class Rod:
         return power
 
     def _near_wall(self) -> bool:
-        """Whether any node has left the axis by more than a quarter of the clearance."""
-        offset, limit = self._offset
-        return bool(offset.max(initial=0.0) > limit or offset.min(initial=0.0) < -limit)
-
-    @cached_property
-    def _offset(self) -> tuple[Array, float]:
-        """Offsets of the nodes from the hole's axis (a view of the unknowns), and a quarter of the clearance."""
-        across = [i for i, name in enumerate(self.ansatz.x_names) if name in ("r1", "r2")]
-        view = self._u.reshape(-1, self.ansatz.size)[:, : len(across)]
-        widest = max(section.outer_diameter or 0.0 for section in self.scene.string)
-        return view, ((self.scene.hole.diameter or 0.0) - widest) / 8
+        """Whether the wall may act on any point of the present state (also where one has lost the hole)."""
+        wall, contact = self.wall, self.scene.contact
+        if wall is None or contact is None:
+            return False
+        reach = contact.smoothing if contact.method == "smooth" else 0.0
+        return not wall.gap > reach or (contact.method == "augmented" and bool(wall.multipliers.any()))
 
     @cached_property
     def _kinetic(self) -> ScalarForm:
-        return ScalarForm(vw.kinetic_energy(self.ansatz, self.u, self.s, self.section, self.loads, self.on))
+        return self.scalar_form(vw.kinetic_energy(self.ansatz, self.u, self.s, self.section, self.loads, self.on))
 
     @cached_property
     def _strain(self) -> ScalarForm:
         x, _ = self.ansatz.split(self.u)
-        return ScalarForm(vw.strain_energy(self.ansatz, x, self.s, self.section, self.loads, self.on))
+        return self.scalar_form(vw.strain_energy(self.ansatz, x, self.s, self.section, self.loads, self.on))
 
     def energies(self) -> tuple[float, float]:
         """Kinetic and strain energy (J) of the present state."""
         return self._kinetic(), self._strain()
+
+    @cached_property
+    def _wall_torque(self) -> ScalarForm:
+        assert self.loads.wall is not None
+        x, v = self.ansatz.split(self.u)
+        at = self.ansatz.configuration(x, self.s)
+        about = Twist(0 * at.r, ufl.as_vector((0, 0, 1)))
+        torque = friction(at, self.ansatz.twist(v, at), about, self.section["contact_radius"], self.loads.wall)
+        return self.scalar_form(torque * self.on.wall)
+
+    def wall_row(self) -> dict[str, float]:
+        """What the wall does to the present state: side force (N, its size summed along the string), friction torque
+        about the string's axis (N m, against its spin), deepest penetration (m)."""
+        assert self.wall is not None and self.scene.contact is not None
+        force = self.wall.side_force(self._u, self.scene.contact)
+        return {
+            "side_force": float(force @ self.wall.weights),
+            "wall_torque": self._wall_torque() if self._near_wall() else 0.0,
+            "penetration": max(0.0, -float(self.wall.gap)),
+        }
 
     # -- fields for pictures -------------------------------------------------------------------------------------------
 
@@ -463,6 +567,14 @@ class Rod:
             "torque": m[:, 2],
             "bending_moment": np.hypot(m[:, 0], m[:, 1]),
         }
+        if self.wall is not None and self.scene.contact is not None:
+            wall, o = self.wall, np.argsort(self.wall.arc_length)
+            out |= {
+                "wall_arc_length": wall.arc_length[o],
+                "wall_depth": wall.p[o],
+                "wall_gap": wall.gaps(self._u)[o],
+                "wall_side_force": wall.side_force(self._u, self.scene.contact)[o],
+            }
         named = {"w3": "spin", "v3": "axial_speed", "phi": "angle"}
         for component, name in named.items():
             if component in self.ansatz.x_names + self.ansatz.v_names:

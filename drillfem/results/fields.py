@@ -40,6 +40,10 @@ STANDARD_FIELDS: dict[str, Variable] = {
     "bending_moment": Variable("N m", long_name="bending moment"),
     "curvature": Variable("1/m", long_name="curvature"),
     "contact_force": Variable("N/m", long_name="contact force per length"),
+    "wall_arc_length": Variable("m", long_name="arc length of a point that may touch the wall"),
+    "wall_depth": Variable("m", long_name="measured depth of the closest point of the hole"),
+    "wall_gap": Variable("m", long_name="gap to the wall, negative in contact"),
+    "wall_side_force": Variable("N/m", long_name="normal force of the wall per length"),
     "rock_angle": Variable("rad", long_name="angle behind the blade"),
     "rock_height": Variable("m", long_name="depth of the rock surface, positive down"),
 }
@@ -47,14 +51,16 @@ STANDARD_FIELDS: dict[str, Variable] = {
 
 
 def field_variables(values: Mapping[str, np.ndarray], units: Mapping[str, str]) -> dict[str, Variable]:
-    """How ``values`` are stored: ``rock_*`` (m,) over ``rock``, others (n,) or (n, 3) over ``node``.
+    """How ``values`` are stored: ``rock_*`` (m,) over ``rock``, ``wall_*`` (w,) over ``wall``, others (n,) or (n, 3)
+    over ``node``.
 
     ``units`` by name go before the standard ones.
     """
     variables = {}
     for name, value in values.items():
         known = STANDARD_FIELDS.get(name, Variable("1"))
-        over = "rock" if name.startswith("rock_") else "node"
+        prefix = name.split("_")[0]
+        over = prefix if prefix in ("rock", "wall") else "node"
         dims = (over,) if value.ndim == 1 else (over, "xyz")
         variables[name] = Variable(units.get(name, known.units), dims, known.long_name)
     return variables

@@ -92,7 +92,7 @@ def straight_frequencies(scene: Scene, upto: float = 40.0) -> dict[str, list[flo
     share = scene.inertia.distributed
     found = {}
     for kind, top, bottom in _ends(scene):
-        if kind == "axial" and model == "torsional":
+        if kind == "axial" and model in ("torsional", "soft-string"):
             continue
         pieces = []
         for s in scene.string:

@@ -83,6 +83,8 @@ class Slot:
             item = typing.get_args(self.type)[0]
             if dataclasses.is_dataclass(item):
                 return "one or more tables"
+            if typing.get_origin(item) is tuple:
+                return "a list of rows of numbers"
             if item is str:
                 return "a list of any of " + ", ".join(k.choices)
             many = "numbers" if k.count is None else f"{k.count} numbers"
@@ -157,7 +159,8 @@ def complaint(root: Mapping[str, Any], path: str, message: str, where: str = "")
 def read(table: type[T], raw: Any, where: str = "") -> T:
     """Frozen dataclass `table` from parsed TOML (or JSON) data; `where` is the dotted path of the table.
 
-    A table may define `check()`, yielding (key, message) for values that do not fit together.
+    A table may define `check()`, yielding (key, message) for values that do not fit together, and `lacking(raw)`:
+    keys that those given make a duty.
     Raises SceneError.
     """
     known = slots(table)
@@ -174,6 +177,10 @@ def read(table: type[T], raw: Any, where: str = "") -> T:
         elif slot.required:
             raise SceneError(f"missing key {path}: must be {slot.expects} ({slot.key.doc})")
     made = table(**values)
+    lacking: Callable[[Mapping[str, Any]], Iterable[str]] = getattr(made, "lacking", lambda _: ())
+    for name in lacking(raw):
+        slot = known[name]
+        raise SceneError(f"missing key {join(where, name)}: must be {slot.expects} ({slot.key.doc})")
     problems: Iterator[tuple[str, str]] = getattr(made, "check", lambda: iter(()))()
     for name, message in problems:
         raise complaint(raw, name, message, where)
@@ -222,11 +229,11 @@ def _scalar(slot: Slot, value: Any, path: str) -> Any:
 
 
 def write(table: Any) -> dict[str, Any]:
-    """Nested plain data (dict, list and SI numbers) of a table; what was not given is left out."""
+    """Nested plain data (dict, list and SI numbers) of a table; what was not given (None, nan) is left out."""
     plain: dict[str, Any] = {}
     for name, slot in slots(type(table)).items():
         value = getattr(table, slot.attribute)
-        if value is not None:
+        if value is not None and value == value:
             plain[name] = _plain(value)
     return plain
 

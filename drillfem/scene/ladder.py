@@ -29,6 +29,8 @@ C16 = NDArray[np.complex128]
 
 MODELS = ("lumped", "torsional", "axial-torsional", "planar", "spatial")  # from the poorest to the richest
 STRAIGHT = MODELS[:3]
+#: A model beside the ladder: torsional with friction along the hole. It is run where it is asked for by name.
+BESIDE = ("soft-string",)
 
 #: What a string that drills nothing has without moving along its axis.
 _TWIST = (*GIVES["torsional"], "top_torque", "top_angular_speed", "top_power")
@@ -61,7 +63,7 @@ class Finding:
 
 def rank(model: str) -> int:
     """Place on the ladder, 0 for the poorest."""
-    return MODELS.index(model)
+    return MODELS.index("torsional" if model in BESIDE else model)
 
 
 def across(v: Sequence[float]) -> bool:
@@ -77,6 +79,12 @@ def obstacle(scene: Scene, model: str) -> str:
     motion = (scene.initial.velocity, scene.initial.angular_velocity)
     if missing := [name for name in scene.output.wanted or () if rank(giver(name)) > rank(model)]:
         return f"it does not give {' and '.join(missing)}"
+    if model == "soft-string":
+        if scene.bites:
+            return "its bit touches no rock"
+        if scene.contact is None or scene.hole.kind == "none":
+            return "it needs a hole and [contact], for its friction"
+        return "" if scene.reference.shape == "straight" else "the unstressed string is bent"
     if model == "lumped" and not scene.drills:
         return "it stands for a string on a cutting bit, and there is none"
     if model not in ("lumped", "torsional") and any(s.name == SPRING for s in scene.string):

@@ -7,18 +7,20 @@ import math
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drillfem.errors import SceneError
 from drillfem.scene import ladder
 from drillfem.scene.keys import complaint, guess, key, read, shown, write
-from drillfem.scene.ladder import MODELS, ModelChoice
+from drillfem.scene.ladder import BESIDE, MODELS, ModelChoice
 from drillfem.scene.nominal import Nominal, nominal
 from drillfem.scene.numbers import expanded
 from drillfem.scene.section import Material, Section
 from drillfem.scene.tables import (
     E3,
+    HOLES,
     Bit,
     Contact,
     Ends,
@@ -27,16 +29,23 @@ from drillfem.scene.tables import (
     Inertia,
     Initial,
     Mesh,
+    Mud,
     Output,
     Reference,
     Rock,
+    SoftString,
     Time,
     TopDrive,
 )
 
+if TYPE_CHECKING:
+    from drillfem.boreholes import Borehole
+
 #: Engines, and the integrators of each.
 ENGINES = {
     "petsc": ("generalized-alpha", "theta", "bdf", "arkimex"),
+    "compiled": ("generalized-alpha", "theta"),
+    "soft-string": (),
     "condensed": ("exact", "trapezoidal", "explicit"),
     "characteristics": ("exact",),
 }
@@ -51,7 +60,7 @@ class Scene:
     name: str = key("short name", default="", default_text="the file's name")
     model: str = key(
         "model; 'auto' takes the poorest that can represent the scene",
-        choices=(*MODELS, "auto"),
+        choices=(*MODELS, *BESIDE, "auto"),
         default="auto",
     )
     reading: str = key(
@@ -62,12 +71,14 @@ class Scene:
     material: Material | None = key("material of all sections without their own", default=None)
     hole: Hole = key("the borehole", default=Hole())
     contact: Contact | None = key("contact with the wall of the hole", default=None, default_text="none")
+    mud: Mud | None = key("drilling fluid", default=None, default_text="none")
     top_drive: TopDrive = key("what turns the string, and the weight on the bit", default=TopDrive())
     bit: Bit | None = key("the bit", default=None, default_text="none")
     rock: Rock | None = key("the rock; needed by a cutting bit", default=None, default_text="none")
     initial: Initial = key("the state at the start", default=Initial())
     ends: Ends = key("how the string is held and loaded at its ends", default=Ends())
     inertia: Inertia = key("where the string's inertia sits", default=Inertia())
+    soft_string: SoftString = key("friction of the soft-string model", default=SoftString())
     reference: Reference = key("shape of the unstressed string", default=Reference())
     gravity: Gravity = key("gravity", default=Gravity())
     mesh: Mesh = key("finite elements along the string", default=Mesh())
@@ -141,6 +152,18 @@ class Scene:
         return self.bit is not None and self.bit.kind == "cutting"
 
     @property
+    def bites(self) -> bool:
+        """Whether rock loads the bit, by the cutting law or the empirical one."""
+        return self.bit is not None and self.bit.kind != "free"
+
+    @cached_property
+    def borehole(self) -> Borehole | None:
+        """Geometry of the hole, or None where there is none."""
+        from drillfem.boreholes import hole_of
+
+        return hole_of(self)
+
+    @property
     def blade_passage(self) -> float:
         """Time between two blades (s) at the speed of the top; infinite where nothing is cut."""
         if self.bit is None or not self.drills or not self.top_drive.speed:
@@ -191,8 +214,13 @@ class Scene:
                 )
             if self.contact is not None and s.outer_diameter is None:
                 yield f"{here}.outer_diameter", "must be given in m for contact"
+            if hole is not None and s.contact_diameter is not None and hole <= s.contact_diameter:
+                yield "hole.diameter", f"must be larger than {here}.contact_diameter = {s.contact_diameter:g} m"
+        kinds = ", ".join(kind for kind in HOLES if kind != "none")
         if self.contact is not None and self.hole.kind == "none":
-            yield "hole.kind", "must be 'straight' where there is [contact]"
+            yield "hole.kind", f"must be one of {kinds} where there is [contact]"
+        if self.hole.bends and self.contact is None:
+            yield "contact", "a table with stiffness, friction_static, friction_dynamic is needed by a hole that bends"
         if hole is not None and self.bit is not None and 2 * self.bit.radius > 1.05 * hole:
             yield "bit.radius", f"must be about half of hole.diameter = {hole:g} m, which the bit drills"
 
@@ -202,12 +230,12 @@ class Scene:
             yield (
                 "ends.top",
                 "must be one of clamped, pinned, hung, free, or there must be a [top_drive] with kind "
-                "imposed-speed or imposed-angle",
+                "imposed-speed, imposed-angle, pi, soft-torque or z-torque",
             )
         if self.bit is not None and drive.axis != E3:
             yield "top_drive.axis", "must be [0, 0, 1] where there is a [bit]"
-        if self.bit is not None and self.reference.shape != "straight":
-            yield "reference.shape", "must be 'straight' where there is a [bit]"
+        if (self.bit is not None or self.hole.bends) and self.reference.shape != "straight":
+            yield "reference.shape", "must be 'straight' where there is a [bit] or a hole that bends"
         if ends.top != "driven" and drive.kind != "none":
             yield "ends.top", f"must be 'driven' where top_drive.kind = {drive.kind!r}"
         if ends.bottom == "bit" and self.bit is None:
@@ -225,13 +253,22 @@ class Scene:
         drive, bit, rock = self.top_drive, self.bit, self.rock
         if self.inertia.distributed != 1 and not self.drills:
             yield "inertia.distributed", "must be 1 where there is no cutting bit to lump inertia at"
+        allowed: tuple[str, ...] = ("nominal", "rest", "literal", "laid")
+        if bit is None or bit.kind == "free":
+            allowed = ("rest", "given") if self.hole.kind == "none" else ("rest", "given", "laid")
+        if self.hole.bends:
+            allowed = tuple(x for x in allowed if x in ("nominal", "laid"))
+        if bit is None or self.hole.bends:
+            if self.initial.state not in allowed:
+                where = "the hole bends" if self.hole.bends else "there is no [bit]"
+                yield "initial.state", f"must be one of {', '.join(allowed)} where {where}"
+        elif self.initial.state == "laid" and self.hole.kind == "none":
+            yield "initial.state", f"must be one of {', '.join(allowed)} where there is no hole to lie in"
         if bit is None:
             if drive.weight_on_bit is not None:
                 yield "top_drive.weight_on_bit", "must be left out where there is no [bit]"
-            if drive.hook_load is not None:
-                yield "top_drive.hook_load", "must be left out where there is no [bit]"
-            if self.initial.state in ("nominal", "literal"):
-                yield "initial.state", "must be one of rest, given where there is no [bit]"
+            if drive.hook_load is not None and self.hole.kind == "none":
+                yield "top_drive.hook_load", "must be left out where there is no [bit] and no hole"
             return
         if bit.kind == "free":
             if drive.weight_on_bit:
@@ -239,8 +276,16 @@ class Scene:
                     "top_drive.weight_on_bit",
                     "must be 0 or left out for bit.kind = 'free', which carries nothing",
                 )
-            if drive.hook_load is not None:
+            if drive.hook_load is not None and self.hole.kind == "none":
                 yield "top_drive.hook_load", "must be left out for bit.kind = 'free': it is the whole weight"
+            return
+        if bit.kind == "empirical":
+            if self.time.analysis == "static":
+                yield "time.analysis", "must be 'dynamic' for bit.kind = 'empirical'"
+            if rock is not None:
+                yield "rock", "must be left out for bit.kind = 'empirical', whose numbers stand for it"
+            if drive.weight_on_bit is None and drive.hook_load is None and drive.block_speed is None:
+                yield "top_drive.weight_on_bit", "must be a number >= 0 in N, or give hook_load or block_speed"
             return
         if rock is None:
             yield (
@@ -252,12 +297,16 @@ class Scene:
         if self.time.analysis == "static":
             yield "time.analysis", "must be 'dynamic' for bit.kind = 'cutting'"
         if drive.kind == "none":
-            yield "top_drive.kind", "must be one of imposed-speed, imposed-angle for bit.kind = 'cutting'"
+            yield "top_drive.kind", "must be one of imposed-speed, imposed-angle, pi, ... for bit.kind = 'cutting'"
         if drive.weight_on_bit is None and drive.hook_load is None:
-            yield (
-                "top_drive.weight_on_bit",
-                "must be a number >= 0 in N, or give top_drive.hook_load in its place",
-            )
+            if drive.block_speed is None:
+                yield (
+                    "top_drive.weight_on_bit",
+                    "must be a number >= 0 in N, or give top_drive.hook_load or block_speed in its place",
+                )
+            elif self.initial.state in ("nominal", "literal"):
+                yield "initial.state", "must be rest or laid where top_drive.block_speed is given"
+            return
         weight, at_bit = self.weight, self.nominal().weight_on_bit
         if drive.hook_load is not None and at_bit <= 0:
             yield (
@@ -313,17 +362,20 @@ class Scene:
     @property
     def condensable(self) -> bool:
         """Whether the string is linear but for its bit, so that the condensed engine can run it."""
-        dynamic = self.drills and self.time.analysis == "dynamic"
+        dynamic = self.drills and self.time.analysis == "dynamic" and not self.top_drive.follows
+        dynamic = dynamic and self.top_drive.block_speed is None and self.ends.top_inertia == 0
         return dynamic and self.resolved_model().name in ("lumped", "torsional", "axial-torsional")
 
     @property
     def engines(self) -> tuple[str, ...]:
         """Engines that can run the scene, the default one first."""
-        if not self.condensable:
-            return ("petsc",)
         model = self.resolved_model().name
+        if model == "soft-string":
+            return ("soft-string",)
+        if not self.condensable:
+            return ("petsc", "compiled") if self.time.analysis == "dynamic" else ("petsc",)
         if model == "axial-torsional":
-            return ("condensed", "petsc")
+            return ("condensed", "petsc", "compiled")
         waves = model == "torsional" and not any(s.retardation_time for s in self.string)
         return ("condensed", "characteristics") if waves else ("condensed",)
 

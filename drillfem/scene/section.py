@@ -202,6 +202,13 @@ class Section:
         default_text="0",
         name="retardation_time",
     )
+    contact_diameter: float | None = key(
+        "diameter of what touches the wall: tool joints, a stabiliser",
+        "m",
+        POSITIVE,
+        default=None,
+        default_text="outer_diameter",
+    )
 
     def check(self) -> Iterator[tuple[str, str]]:
         if self.stiffness is not None:
@@ -231,6 +238,11 @@ class Section:
     def outer_radius(self) -> float:
         """Outer radius in m; 0 for a direct stiffness without outer_diameter."""
         return (self.outer_diameter or 0.0) / 2
+
+    @property
+    def contact_radius(self) -> float:
+        """Radius in m of what touches the wall; 0 for a direct stiffness without outer_diameter."""
+        return (self.contact_diameter or self.outer_diameter or 0.0) / 2
 
     @property
     def area(self) -> float:

@@ -7,11 +7,11 @@ Everything is in SI units; names of attributes are the names of the TOML keys.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
-from drillfem.scene.keys import NOT_NEGATIVE, POSITIVE, Bound, at_least, between, key
+from drillfem.scene.keys import NOT_NEGATIVE, POSITIVE, Bound, at_least, between, key, slots
 
 Vector = tuple[float, ...]
 E1, E2, E3 = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -39,12 +39,102 @@ def is_unit(v: Vector) -> bool:
 
 
 @dataclass(frozen=True)
-class Hole:
-    """The borehole around the string."""
+class HoleSection:
+    """A stretch of the hole's wall: casing, or open hole; sections follow each other from the top down."""
 
-    kind: str = key("shape of the hole's centreline", choices=("none", "straight"), default="none")
+    to: float = key("measured depth of its lower end (the last one holds to the end of the hole)", "m", POSITIVE)
+    diameter: float | None = key("diameter", "m", POSITIVE, default=None, default_text="hole.diameter")
+    friction_static: float | None = key(
+        "mu_s on this stretch", "1", NOT_NEGATIVE, default=None, default_text="contact.friction_static"
+    )
+    friction_dynamic: float | None = key(
+        "mu_d on this stretch", "1", NOT_NEGATIVE, default=None, default_text="contact.friction_dynamic"
+    )
+
+
+#: What each kind of hole needs, besides a diameter.
+HOLES: dict[str, tuple[str, ...]] = {
+    "none": (),
+    "straight": (),
+    "arc": ("radius",),
+    "build": ("kick_off", "radius", "final_inclination"),
+    "helix": ("radius", "pitch"),
+    "spline": ("points",),
+    "survey": ("survey",),
+}
+#: Where those keys, and what else shapes a hole, make sense.
+_SHAPES = {
+    "inclination": ("straight", "arc", "build"),
+    "azimuth": ("straight", "arc", "build", "helix"),
+    "radius": ("arc", "build", "helix"),
+    "kick_off": ("build",),
+    "final_inclination": ("build",),
+    "transition": ("build",),
+    "pitch": ("helix",),
+    "points": ("spline",),
+    "survey": ("survey",),
+}
+
+
+@dataclass(frozen=True)
+class Hole:
+    """The borehole around the string: from the origin down, e1 is north, e2 east, e3 down."""
+
+    kind: str = key(
+        "shape of the hole's centreline: straight; 'arc'; 'build': straight, arc, straight; 'helix' about the "
+        "vertical; 'spline' through points; 'survey' by minimum curvature",
+        choices=tuple(HOLES),
+        default="none",
+    )
     diameter: float | None = key(
         "diameter of the hole", "m", POSITIVE, default=None, default_text="required with a hole"
+    )
+    inclination: float = key(
+        "angle from the vertical at the top; 0 is along e3", "rad", between(0, math.pi), default=0.0
+    )
+    azimuth: float = key("angle of the bend, or of the inclined hole, from north to east", "rad", default=0.0)
+    kick_off: float | None = key(
+        "measured depth where a 'build' starts to bend", "m", NOT_NEGATIVE, default=None, default_text="see kind"
+    )
+    radius: float | None = key(
+        "radius of curvature of arc and build; of a helix, that of its cylinder",
+        "m",
+        POSITIVE,
+        default=None,
+        default_text="see kind",
+    )
+    final_inclination: float | None = key(
+        "inclination at which a 'build' becomes straight again",
+        "rad",
+        between(0, math.pi),
+        default=None,
+        default_text="see kind",
+    )
+    transition: float = key(
+        "length of hole over which the curvature of a 'build' rises and falls; 0: it jumps",
+        "m",
+        NOT_NEGATIVE,
+        default=0.0,
+    )
+    pitch: float | None = key("depth that a helix gains per turn", "m", POSITIVE, default=None, default_text="see kind")
+    points: tuple[Vector, ...] | None = key(
+        "points [north, east, down] of a 'spline', the first one the origin",
+        "m",
+        default=None,
+        default_text="see kind",
+    )
+    survey: tuple[Vector, ...] | None = key(
+        "stations [measured depth m, inclination rad, azimuth rad], or the name of a CSV file or built-in survey",
+        default=None,
+        default_text="see kind",
+    )
+    caliper: tuple[Vector, ...] | None = key(
+        "diameters along the hole, rows [measured depth m, diameter m], or the name of a CSV file",
+        default=None,
+        default_text="none",
+    )
+    section: tuple[HoleSection, ...] | None = key(
+        "stretches with their own diameter or friction", default=None, default_text="none"
     )
 
     def check(self) -> Iterator[tuple[str, str]]:
@@ -52,32 +142,100 @@ class Hole:
             yield "diameter", "must be left out where kind = 'none'"
         if self.kind != "none" and self.diameter is None:
             yield "diameter", "must be a number > 0 in m, or text with such a unit"
+        for name in HOLES[self.kind]:
+            if getattr(self, name) is None:
+                yield name, f"must be given for kind = {self.kind!r}"
+        for name, kinds in _SHAPES.items():
+            if self.kind not in kinds and getattr(self, name) not in (None, 0.0):
+                yield name, f"must be left out where kind = {self.kind!r}; it belongs to {' and '.join(kinds)}"
+        for name in ("caliper", "section"):
+            if self.kind == "none" and getattr(self, name) is not None:
+                yield name, "must be left out where kind = 'none'"
+        for name, columns in (("points", 3), ("survey", 3), ("caliper", 2)):
+            rows = getattr(self, name) or ()
+            if any(len(row) != columns for row in rows):
+                yield name, f"must have rows of {columns} numbers"
+                return
+            if rows and len(rows) < 2:
+                yield name, "must have two rows or more"
+        for name in ("survey", "caliper"):
+            rows = getattr(self, name) or ()
+            if any(b[0] <= a[0] for a, b in pairwise(rows)):
+                yield name, "must have measured depths that increase from row to row"
+        if self.section is not None and any(b.to <= a.to for a, b in pairwise(self.section)):
+            yield "section", "must follow each other from the top down: 'to' must increase"
+        if self.kind == "build" and self.final_inclination is not None and self.final_inclination <= self.inclination:
+            yield "final_inclination", f"must exceed inclination = {self.inclination:g} rad at the top"
+
+    @property
+    def bends(self) -> bool:
+        """Whether the hole leaves the axis e3 of the unstressed string."""
+        return self.kind not in ("none", "straight") or self.inclination != 0
 
 
 @dataclass(frozen=True)
 class Contact:
-    """Contact with the wall: penalty per length of string, and a regularised friction law (4-4)-(4-11)."""
+    """Contact with the wall, and a regularised friction law (4-4)-(4-11)."""
 
     stiffness: float = key("penalty k_s: force per length and penetration", "N/m^2", POSITIVE)
     friction_static: float = key("coefficient mu_s: the peak of the friction law", "1", NOT_NEGATIVE)
     friction_dynamic: float = key("coefficient mu_d at high speed", "1", NOT_NEGATIVE)
+    method: str = key(
+        "'penalty': (4-5); 'smooth': the same, rounded off where it begins; 'augmented': penalty with multipliers that "
+        "push the penetration below its tolerance",
+        choices=("penalty", "smooth", "augmented"),
+        default="penalty",
+    )
+    smoothing: float = key("smooth: half the range of gap over which the force builds up", "m", POSITIVE, default=1e-3)
+    penetration_tolerance: float = key("augmented: penetration that is small enough", "m", POSITIVE, default=1e-5)
     friction_velocity_scale: float = key("n: the peak lies near the speed 1/n", "s/m", POSITIVE, default=20.0)
     friction_regularisation: float = key("epsilon: rounds the law off at zero speed", "1", POSITIVE, default=1e-4)
+    friction_profile: tuple[Vector, ...] | None = key(
+        "friction along the hole, rows [measured depth m, mu_s, mu_d], or the name of a CSV file",
+        default=None,
+        default_text="none",
+    )
     projected: bool = key(
         "friction from the sliding speed along the wall only (false: the whole speed, as printed)",
         default=True,
+    )
+    closest_point: str = key(
+        "how the hole's closest point is found: 'newton' per point, or as a 'field' solved with the rod (D-6)",
+        choices=("newton", "field"),
+        default="newton",
     )
 
     def check(self) -> Iterator[tuple[str, str]]:
         if self.friction_dynamic > self.friction_static:
             yield "friction_dynamic", f"must not exceed friction_static = {self.friction_static:g}"
+        rows = self.friction_profile or ()
+        if any(len(row) != 3 for row in rows):
+            yield "friction_profile", "must have rows of 3 numbers"
+        elif any(b[0] <= a[0] for a, b in pairwise(rows)):
+            yield "friction_profile", "must have measured depths that increase from row to row"
+        elif any(not 0 <= mu_d <= mu_s for _, mu_s, mu_d in rows):
+            yield "friction_profile", "must have 0 <= mu_d <= mu_s in every row"
+
+
+@dataclass(frozen=True)
+class Mud:
+    """Drilling fluid around and inside the string: what it takes off the weight, and how it slows the motion."""
+
+    density: float = key("density", "kg/m^3", POSITIVE)
+    viscosity: float = key("dynamic viscosity", "Pa s", NOT_NEGATIVE, default=0.0)
+    added_mass: bool = key("fluid that must move aside adds to the lateral inertia", default=False)
 
 
 @dataclass(frozen=True)
 class TopDrive:
     """What turns the string at its top, and what it hangs on."""
 
-    kind: str = key("how the top is turned", choices=("imposed-speed", "imposed-angle", "none"), default="none")
+    kind: str = key(
+        "how the top is turned: by a speed or an angle, or by a torque that follows the speed: 'pi' (4-1), "
+        "'soft-torque' (PI tuned to the string's impedance) or 'z-torque' (matched at all frequencies)",
+        choices=("imposed-speed", "imposed-angle", "pi", "soft-torque", "z-torque", "none"),
+        default="none",
+    )
     speed: float | None = key(
         "speed Omega_0 (of a profile: the speed that it is built around)",
         "rad/s",
@@ -90,7 +248,27 @@ class TopDrive:
         default=None,
         default_text="required for imposed-angle",
     )
-    rise_time: float = key("time in which 'spin-up' reaches speed", "s", POSITIVE, default=15.0)
+    rise_time: float | None = key(
+        "time in which the wanted speed rises from 0; 'spin-up' needs it",
+        "s",
+        POSITIVE,
+        default=None,
+        default_text="spin-up: 15; else the speed is there at once",
+    )
+    proportional_gain: float | None = key(
+        "k_p of kind 'pi'", "N m s/rad", NOT_NEGATIVE, default=None, default_text="required for pi"
+    )
+    integral_gain: float | None = key(
+        "k_i of kind 'pi'", "N m/rad", NOT_NEGATIVE, default=None, default_text="required for pi"
+    )
+    tuning_frequency: float | None = key(
+        "frequency at which 'soft-torque' matches the string's impedance",
+        "Hz",
+        POSITIVE,
+        default=None,
+        default_text="the string's lowest",
+    )
+    torque_limit: float | None = key("largest torque of the drive", "N m", POSITIVE, default=None, default_text="none")
     axis: Vector = key(
         "unit vector about which the top turns; e3 points down along the straight string",
         "1",
@@ -107,6 +285,12 @@ class TopDrive:
     hook_load: float | None = key(
         "H0, in the place of weight_on_bit", "N", NOT_NEGATIVE, default=None, default_text="see weight_on_bit"
     )
+    block_speed: float | None = key(
+        "axial speed of the top, down is positive, in the place of a load on the hook",
+        "m/s",
+        default=None,
+        default_text="0 where nothing is drilled",
+    )
 
     def check(self) -> Iterator[tuple[str, str]]:
         if not is_unit(self.axis):
@@ -122,6 +306,26 @@ class TopDrive:
                 "hook_load",
                 f"must be left out where weight_on_bit = {self.weight_on_bit:g} N is given: one follows from the other",
             )
+        if self.block_speed is not None and (self.weight_on_bit is not None or self.hook_load is not None):
+            yield "block_speed", "must be left out where the load on the hook is given"
+        for name in ("proportional_gain", "integral_gain"):
+            if self.kind == "pi" and getattr(self, name) is None:
+                yield name, f"must be a number >= 0 in {slots(TopDrive)[name].key.unit} for kind = 'pi'"
+            if self.kind != "pi" and getattr(self, name) is not None:
+                yield name, f"must be left out where kind = {self.kind!r}"
+        if self.kind != "soft-torque" and self.tuning_frequency is not None:
+            yield "tuning_frequency", f"must be left out where kind = {self.kind!r}"
+        if not self.follows and self.torque_limit is not None:
+            yield "torque_limit", f"must be left out where kind = {self.kind!r}: an imposed motion takes what it needs"
+        if self.follows and self.axis != E3:
+            yield "axis", f"must be [0, 0, 1] for kind = {self.kind!r}"
+        if self.kind == "none" and self.rise_time is not None:
+            yield "rise_time", "must be left out where kind = 'none'"
+
+    @property
+    def follows(self) -> bool:
+        """Whether the drive is a torque that follows the speed, not an imposed motion."""
+        return self.kind in ("pi", "soft-torque", "z-torque")
 
     def motion(self, t: float) -> tuple[float, float, float]:
         """Imposed angle in rad, speed in rad/s and acceleration in rad/s2 of the top at time t >= 0 in s.
@@ -132,7 +336,7 @@ class TopDrive:
             return 0.0, 0.0, 0.0
         omega = self.speed
         if self.profile == "spin-up":
-            rise = self.rise_time
+            rise = self.rise_time or 15.0
             if t > rise:
                 return omega * (t - rise / 2), omega, 0.0
             w = 2 * math.pi / rise
@@ -148,19 +352,46 @@ class TopDrive:
                 omega - 2 * math.sin(2 * x) - 2 * math.sin(10 * x),
                 -4 * math.cos(2 * x) - 20 * math.cos(10 * x),
             )
+        if self.rise_time is not None and self.profile is None:
+            rise = self.rise_time
+            if t < rise:
+                return omega * t**2 / (2 * rise), omega * t / rise, omega / rise
+            return omega * (t - rise / 2), omega, 0.0
         return omega * t, omega, 0.0
 
 
 @dataclass(frozen=True)
-class Bit:
-    """The bit: drag bit of Detournay's law (5-5)-(5-19), or a bit that touches nothing."""
+class Empirical:
+    """Torque and rate of penetration as functions of weight and spin, regularised (B-5); table B.2."""
 
-    kind: str = key("law of the bit; 'free' touches no rock", choices=("cutting", "free"))
-    radius: float = key("radius a", "m", POSITIVE)
-    blades: int = key("number of blades n_b", bound=at_least(1))
-    wear_flat_length: float = key("wear flat l, the sum over all blades", "m", NOT_NEGATIVE)
-    friction: float = key("coefficient mu between wear flat and rock", "1", NOT_NEGATIVE)
-    inclination: float = key("zeta: vertical over horizontal cutting force", "1", POSITIVE)
+    a1: float = key("a_1: rate of penetration that weight must overcome", "m/s", default=3.429e-3)
+    a2: float = key("a_2: rate of penetration per weight", "m/(N s)", POSITIVE, default=5.672e-8)
+    a3: float = key("a_3: depth of cut that the spin gives", "m/rad", default=1.374e-4)
+    a4: float = key("a_4: torque per depth of cut", "N rad", NOT_NEGATIVE, default=9.537e6)
+    a5: float = key("a_5: torque at no depth of cut", "N m", NOT_NEGATIVE, default=1475.0)
+    regularisation: float = key("epsilon: spin over which all of it builds up", "rad/s", POSITIVE, default=2.0)
+
+
+_BY_CUTTING = "required by a cutting bit"
+_CUTS = ("radius", "blades", "wear_flat_length", "friction", "inclination")
+
+
+@dataclass(frozen=True)
+class Bit:
+    """The bit: Detournay's drag bit (5-5)-(5-19), the empirical law of Appendix B.4, or a bit that touches nothing."""
+
+    kind: str = key("law of the bit; 'free' touches no rock", choices=("cutting", "free", "empirical"))
+    radius: float = key("radius a", "m", POSITIVE, default=math.nan, default_text=_BY_CUTTING)
+    blades: int = key("number of blades n_b", bound=at_least(1), default=1, default_text=_BY_CUTTING)
+    wear_flat_length: float = key(
+        "wear flat l, the sum over all blades", "m", NOT_NEGATIVE, default=math.nan, default_text=_BY_CUTTING
+    )
+    friction: float = key(
+        "coefficient mu between wear flat and rock", "1", NOT_NEGATIVE, default=math.nan, default_text=_BY_CUTTING
+    )
+    inclination: float = key(
+        "zeta: vertical over horizontal cutting force", "1", POSITIVE, default=math.nan, default_text=_BY_CUTTING
+    )
     geometry: float = key("gamma: where the wear flats lie on the radius", "1", POSITIVE, default=1.0)
     blade_angles: Vector | None = key(
         "angles of the blades if not equally spaced, increasing within one turn",
@@ -180,6 +411,15 @@ class Bit:
     cutting_regularisation: float = key(
         "c3: spin over which the cutting force builds up", "rad/s", POSITIVE, default=1e-3
     )
+
+    empirical: Empirical = key("numbers of the empirical law", default=Empirical())
+    guide_stiffness: float = key(
+        "force per length that holds the bit on the centreline of a curved hole", "N/m", POSITIVE, default=1e7
+    )
+
+    def lacking(self, raw: Mapping[str, object]) -> Iterator[str]:
+        if self.kind == "cutting":
+            yield from (name for name in _CUTS if name not in raw)
 
     def check(self) -> Iterator[tuple[str, str]]:
         angles = self.blade_angles
@@ -241,8 +481,8 @@ class Initial:
 
     state: str = key(
         "'nominal': steady drilling; 'literal': as the thesis prints it, untwisted; 'rest'; 'given': the "
-        "unstressed string in rigid motion",
-        choices=("nominal", "rest", "literal", "given"),
+        "unstressed string in rigid motion; 'laid': at rest in the hole, in equilibrium without friction",
+        choices=("nominal", "rest", "literal", "given", "laid"),
         default="nominal",
     )
     spin_perturbation: float = key(
@@ -305,6 +545,28 @@ class Inertia:
         Bound("> 0 and <= 1", lambda x: 0 < x <= 1),
         default=1.0,
     )
+
+
+@dataclass(frozen=True)
+class SoftString:
+    """How the soft-string model finds the friction along the hole."""
+
+    side_load: str = key(
+        "wall force per length: of the weight across the hole, or also of the tension in its bends (errata 22)",
+        choices=("inclination", "weight-and-curvature"),
+        default="weight-and-curvature",
+    )
+    friction_argument: str = key(
+        "what the friction law takes for speed: that of the touching point, or (as printed) the spin",
+        choices=("contact-speed", "spin"),
+        default="contact-speed",
+    )
+    law: str = key(
+        "'stribeck' (4-7), or 'coulomb': set-valued, dynamic above threshold_spin",
+        choices=("stribeck", "coulomb"),
+        default="stribeck",
+    )
+    threshold_spin: float = key("coulomb: spin above which friction is dynamic", "rad/s", POSITIVE, default=1.0)
 
 
 @dataclass(frozen=True)
@@ -396,9 +658,9 @@ class Time:
         default="kept",
     )
     engine: str = key(
-        "'petsc' steps the whole system, 'condensed' a straight string reduced to its bit, 'characteristics' an "
-        "undamped torsional one along its waves",
-        choices=("default", "petsc", "condensed", "characteristics"),
+        "'petsc' steps the whole system, 'compiled' does so by a compiled loop, 'condensed' a straight string reduced "
+        "to its bit, 'characteristics' an undamped torsional one along its waves",
+        choices=("default", "petsc", "compiled", "condensed", "characteristics"),
         default="default",
     )
 

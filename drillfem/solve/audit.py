@@ -31,9 +31,15 @@ DRILLING = _OF_THE_BIT | {"rock_volume": "m^3"}
 TIP = {"tip_x": "m", "tip_y": "m", "tip_z": "m"}
 
 
-def variables(drilling: bool) -> dict[str, str]:
+#: of the lower end of a string that turns, and of a string in contact with its hole
+TURNING = {name: _OF_THE_BIT[name] for name in ("bit_angular_speed", "bit_axial_speed", "bit_angle")}
+WALL = {"side_force": "N", "wall_torque": "N m", "penetration": "m"}
+
+
+def variables(drilling: bool, turning: bool = False, wall: bool = False) -> dict[str, str]:
     """History variables of a run, name to unit."""
-    return COMMON | dict.fromkeys(WORKS, "J") | (DRILLING if drilling else TIP)
+    found = COMMON | dict.fromkeys(WORKS, "J") | (DRILLING if drilling else TIP)
+    return found | (TURNING if turning else {}) | (WALL if wall else {})
 
 
 def imbalance(works: dict[str, Array], stored: Array, stored_at_start: float, scale: float) -> tuple[Array, float]:

@@ -146,11 +146,11 @@ def shafts_of(scene: Scene) -> tuple[tuple[Shaft, ...], float]:
     return tuple(shafts), lumped_at_bit(scene)[1] + scene.ends.bottom_inertia
 
 
-def wave_step(times: Sequence[float], longest: float) -> tuple[float, I8, float]:
+def wave_step(times: Sequence[float], longest: float, tolerance: float = COMMENSURATE) -> tuple[float, I8, float]:
     """Internal step (s, at most ``longest``), steps in each travel time, and the largest relative error of one.
 
-    The longest step that divides all travel times to round-off; if there is none above a 64th of ``longest``, the
-    one that does so best: travel times are then off by the stated error, impedances are kept.
+    The longest step that divides all travel times to ``tolerance`` (round-off); if there is none above a 64th of
+    ``longest``, the one that does so best: travel times are then off by the stated error, impedances are kept.
     """
     times_ = np.asarray(times, float)
     shortest, best = times_.min(), (np.inf, 0)
@@ -160,7 +160,7 @@ def wave_step(times: Sequence[float], longest: float) -> tuple[float, I8, float]
         error = float(np.abs(counts * shortest / n / times_ - 1.0).max())
         if error < best[0]:
             best = (error, n)
-        if error <= COMMENSURATE:
+        if error <= tolerance:
             break
     error, n = best
     counts = np.maximum(1.0, np.round(times_ * n / shortest))

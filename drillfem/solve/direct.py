@@ -10,18 +10,27 @@ import numpy as np
 
 from ..compat import Array
 from ..errors import SimulationError
-from ..models.initial import initial_state
 from ..models.rod import Rod
 from ..results import ResultWriter
 from .audit import COMMON, TIP, WORKS, EnergyAudit, variables
 from .contact import RockContact
-from .dynamics import Stepper
+from .dynamics import Marcher, Stepper
 from .guards import runaway
 from .interrupt import Interrupts
+from .laid import start_of
 from .newton import turn_between
 from .statics import Statics
 
 Observer = Callable[[float], None]
+
+
+def _marcher(engine: str) -> type[Marcher]:
+    """Who steps: PETSc, or the compiled engine."""
+    if engine != "compiled":
+        return Stepper
+    from .compiled import CompiledStepper
+
+    return CompiledStepper
 
 
 class DirectRun:
@@ -29,19 +38,28 @@ class DirectRun:
 
     def __init__(self, rod: Rod) -> None:
         self.rod, scene = rod, rod.scene
-        u0 = initial_state(rod)
+        marcher = _marcher(scene.engine)
+        marcher.adopt(rod)
+        u0 = start_of(rod)
         self.rock = RockContact.from_scene(scene) if rod.has_bit else None
-        self.stepper = Stepper(rod, u0, self.rock)
+        self.stepper = marcher(rod, u0, self.rock)
         self.bit_angle = 0.0
-        self.depth_start = float(u0[rod.bit.depth]) if rod.has_bit else 0.0
         self.steps = 0
+        self.depth_start = 0.0
+        self.depth_start = self._bit_motion(u0)[0] if rod.turns else 0.0
         self._mark_bit(u0)
         self._first_row(u0)
 
     # -- start ---------------------------------------------------------------------------------------------------------
 
+    def _bit_motion(self, u: Array) -> tuple[float, float, float]:
+        """Depth drilled (m), axial speed (m/s) and spin (rad/s) of the lower end in a state."""
+        self.rod.find_hole(u)
+        depth, speed, spin = self.rod.end_motion(u)
+        return depth - self.depth_start, speed, spin
+
     def _mark_bit(self, u: Array) -> None:
-        if not self.rod.has_bit:
+        if not self.rod.turns:
             return
         at = self.rod.bit
         rotation = u[at.rotation]
@@ -53,8 +71,8 @@ class DirectRun:
     def _first_row(self, u: Array) -> None:
         rod = self.rod
         if self.rock is not None:
-            at = rod.bit
-            rod.set_bit_load(*self.rock.at_rest(u[at.speed], u[at.spin], 0.0))
+            _, speed, spin = self._bit_motion(u)
+            rod.set_bit_load(*self.rock.at_rest(speed, spin, 0.0))
         rod.residual(rod.scene.time.start, u, np.zeros_like(u), np.empty_like(u))
         kinetic, strain = rod.energies()
         self._stored = kinetic + strain
@@ -69,8 +87,7 @@ class DirectRun:
         spin = rod.scene.top_drive.motion(t)[1]
         bit = 0.0
         if rod.has_bit:
-            u, at = rod.u.x.array, rod.bit
-            bit = float(rod.bit_load @ (u[at.speed], u[at.spin]))
+            bit = float(rod.bit_load @ rod.end_motion(rod.u.x.array)[1:])
         return {
             "work_top_drive": rod.top_torque() * spin,
             "work_gravity": -p["gravity"],
@@ -83,15 +100,16 @@ class DirectRun:
     def step(self, until: float) -> float:
         """One accepted step; moves the rock, books the energy. Returns the time."""
         rod = self.rod
-        before = self.stepper.u[rod.bit.speed] if self.rock is not None else 0.0
+        before = self._bit_motion(self.stepper.u)[1] if self.rock is not None else 0.0
         report = self.stepper.step(until)
         self.audit.add(report.stage_time, self._powers(report.stage_time))
-        if self.rock is not None:
-            u, at = self.stepper.u, rod.bit
-            rotation = u[at.rotation]
-            turn = turn_between(self.rotation, rotation)
+        if rod.turns:
+            u = self.stepper.u
+            turn = turn_between(self.rotation, u[rod.bit.rotation])
             self.bit_angle += turn
-            self.rock.commit(turn, u[at.depth] - self.depth_start, report.step, before, u[at.speed], u[at.spin])
+            if self.rock is not None:
+                depth, speed, spin = self._bit_motion(u)
+                self.rock.commit(turn, depth, report.step, before, speed, spin)
             self._mark_bit(u)
         self.steps += 1
         return report.time
@@ -113,13 +131,14 @@ class DirectRun:
             **self.audit.works,
         }
         self._stored = kinetic + strain
+        if rod.wall is not None:
+            out |= rod.wall_row()
+        if rod.turns:
+            depth, speed, spin = self._bit_motion(u)
+            out |= {"bit_angular_speed": spin, "bit_axial_speed": speed, "bit_angle": self.bit_angle}
         if self.rock is not None:
-            at = rod.bit
             return out | {
-                "bit_angular_speed": float(u[at.spin]),
-                "bit_axial_speed": float(u[at.speed]),
-                "bit_angle": self.bit_angle,
-                "bit_depth": float(u[at.depth]) - self.depth_start,
+                "bit_depth": depth,
                 "bit_torque": float(rod.bit_load[1]),
                 "bit_weight": float(rod.bit_load[0]),
                 "depth_of_cut": self.rock.depth_of_cut(),
@@ -152,7 +171,7 @@ class DirectRun:
             "audit_scale": self.audit.scale,
             "powers": dict(self.audit.powers),
             "works": dict(self.audit.works),
-            "time_step": self.stepper.ts.getTimeStep(),
+            "time_step": self.stepper.length,
         }
         if self.rock is not None:
             state["rock"] = self.rock.save()
@@ -161,9 +180,7 @@ class DirectRun:
     def load(self, t: float, state: dict[str, Any]) -> None:
         """Continue from a saved state."""
         rod, stepper = self.rod, self.stepper
-        stepper.vec.setArray(state["u"])
-        stepper.ts.setTime(t)
-        stepper.ts.setTimeStep(float(state["time_step"]))
+        stepper.set_state(t, state["u"], float(state["time_step"]))
         rod.set_bit_load(*state["bit_load"])
         self._stored = float(state["stored"])
         self.bit_angle, self.steps = float(state["bit_angle"]), int(state["steps"])
@@ -177,6 +194,7 @@ class DirectRun:
         )
         if self.rock is not None:
             self.rock.load(state["rock"])
+        rod.seek_hole(stepper.u)
         self._mark_bit(stepper.u)
 
     def summary(self) -> dict[str, Any]:
@@ -190,7 +208,7 @@ class DirectRun:
         }
 
     def destroy(self) -> None:
-        """Free the PETSc objects."""
+        """Free what is not Python's."""
         self.stepper.destroy()
 
 
@@ -206,7 +224,7 @@ def run_dynamic(scene: Any, writer_of: Callable[..., ResultWriter], until: float
     """March a scene to ``until``, writing as it goes. Returns the Result."""
     rod = Rod(scene)
     run = DirectRun(rod)
-    writer = writer_of(rod.model, rod.size, variables(rod.has_bit))
+    writer = writer_of(rod.model, rod.size, variables(rod.has_bit, rod.turns, rod.wall is not None))
     start = scene.time.start
     out = scene.output
     try:
@@ -254,7 +272,7 @@ def run_static(scene: Any, writer_of: Callable[..., ResultWriter], progress: Obs
     """Follow the loads of a static scene from 0 to 1; the load factor stands on the time axis."""
     rod = Rod(scene)
     statics = Statics(rod)
-    u0 = initial_state(rod)
+    u0 = start_of(rod)
     writer = writer_of(rod.model, len(statics.x.x.array), variables(False))
     force, moment, g = (c.value.copy() for c in (rod.tip_force, rod.tip_moment, rod.loads.g))
     n = len(rod.ansatz.x_names)

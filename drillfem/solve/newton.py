@@ -1,4 +1,4 @@
-"""Newton's method for a rod with a bit in rock, as a PETSc SNES.
+"""Newton's method for a rod with a bit in rock, whoever assembles and factorises (:class:`System`).
 
 Two ideas make it robust and fast.
 
@@ -15,10 +15,10 @@ used in the frame that has turned since: P = T J0^-1 T^-1 with T the nodal turn.
 from __future__ import annotations
 
 import math
+from enum import Enum
 from typing import Any, Protocol
 
 import numpy as np
-from petsc4py import PETSc
 
 from ..bitrock.jit import kernel
 from ..compat import Array
@@ -52,6 +52,37 @@ class BitLoad(Protocol):
         ...
 
 
+class System(Protocol):
+    """The equations of one step F(x) = 0, and their Jacobian at a state of some time ago."""
+
+    #: d(stage)/dx: generalised-alpha solves for the end of the step, evaluates inside it
+    stage_fraction: float
+
+    def residual(self) -> Array:
+        """F at the present x, shape (dofs,): a view, which may be overwritten. The rod takes the state of the stage."""
+        ...
+
+    def shift(self) -> float:
+        """d(u-dot)/du of the stage at which the residual was evaluated last (1/s)."""
+        ...
+
+    def factorise(self) -> None:
+        """Renew the Jacobian, at the stage at which the residual was evaluated last."""
+        ...
+
+    def solve(self, b: Array) -> Array:
+        """J^-1 b, shape (dofs,): a view, which may be overwritten, valid until the next."""
+        ...
+
+
+class Outcome(Enum):
+    """How a solve ended."""
+
+    CONVERGED = 1
+    SLOW = 2
+    NAN = 3
+
+
 @kernel()
 def _turns(reference: Array, now: Array, cosine: Array, sine: Array) -> None:
     """Half angle of the turn about d3 between two sets of nodal quaternions (n, 4): cosine and sine (n,)."""
@@ -78,6 +109,13 @@ def _turn(y: Array, cosine: Array, sine: Array, way: float) -> None:
 
 
 @kernel()
+def _extrapolate(x1: Array, x2: Array, x3: Array, out: Array) -> None:
+    """Parabola through three values at equal distances, carried on by one distance."""
+    for i in range(len(out)):
+        out[i] = 3 * (x1[i] - x2[i]) + x3[i]
+
+
+@kernel()
 def _weighted(delta: Array, weight: Array) -> float:
     """Largest |delta| in units of its tolerance."""
     worst = 0.0
@@ -101,7 +139,7 @@ def turn_between(rotation_from: Any, rotation_to: Any) -> float:
 
 
 class BitCoupledNewton:
-    """Context of a Python SNES: solves F(x; weight, torque) = 0 together with the bit-rock law.
+    """Solves F(x; weight, torque) = 0 together with the bit-rock law.
 
     ``keep``: keep the factorised Jacobian (and turn it with the string); else renew it in every iteration.
     """
@@ -110,10 +148,6 @@ class BitCoupledNewton:
         self.rod, self.bit, self.keep = rod, bit, keep
         self.iterations = 0
         self.factorisations = 0
-        self.shift = 0.0
-        self.only_shift = False
-        #: d(stage)/d(unknown): generalised-alpha solves for the end of the step, evaluates inside it
-        self.stage_fraction = 1.0
         #: start from the last three solutions; no guide where a step has several stages
         self.extrapolate = True
         #: where the bit was at the last accepted step
@@ -144,63 +178,31 @@ class BitCoupledNewton:
             self._bit_at = (turn, at.depth - first, at.speed - first, at.spin - first)
         self._history: list[Array] = []
 
-    # -- called by the time stepper ---------------------------------------------------------------------------------
-
     def forget(self) -> None:
         """Start afresh, as after a restart: no kept Jacobian, no extrapolation."""
         self._renew = True
         self._history.clear()
 
-    def jacobian(self, shift: float, matrix: PETSc.Mat) -> None:
-        """Assemble at the present state of the rod (or only note the shift, when asked to)."""
-        self.shift = shift
-        if not self.only_shift:
-            rod = self.rod
-            rod.jacobian(rod.u.x.array.copy(), rod.u_dot.x.array.copy(), shift, matrix)
-
-    # -- SNES -------------------------------------------------------------------------------------------------------
-
-    def setUp(self, snes: PETSc.SNES) -> None:
-        """Create work space and the direct solver."""
-        self._matrix = snes.getJacobian()[1]
-        self._ksp = PETSc.KSP().create(self._matrix.comm)
-        self._ksp.setOperators(self._matrix)
-        self._ksp.setType(PETSc.KSP.Type.PREONLY)
-        pc = self._ksp.getPC()
-        pc.setType(PETSc.PC.Type.LU)
-        pc.setFactorOrdering("rcm")
-        self._f = self._matrix.createVecLeft()
-        self._y = self._matrix.createVecRight()
-        self._residual = self._matrix.createVecLeft()
-        # some integrators scale the matrix they ask for: when only the shift is wanted, this one
-        self._decoy = PETSc.Mat().createConstantDiagonal(self._matrix.getSizes(), 1.0, comm=self._matrix.comm)
-        self._decoy.assemble()
-
     def _quaternions(self) -> Array:
         return self._stage.reshape(-1, 13)[:, 3:7]
 
-    def _solve_kept(self, rhs: Array) -> Array:
-        """J0^-1 T^-1 rhs: the kept Jacobian, in the frame in which it was factorised (a view, valid until the next)."""
-        work = self._f.getArray()
-        work[:] = rhs
+    def _solve_kept(self, system: System, b: Array) -> Array:
+        """J0^-1 T^-1 b: the kept Jacobian, in the frame in which it was factorised; overwrites b."""
         if self._turning:
-            _turn(work.reshape(-1, 13), self._cosine, self._sine, -1.0)
-        self._ksp.solve(self._f, self._y)
-        return self._y.getArray()
+            _turn(b.reshape(-1, 13), self._cosine, self._sine, -1.0)
+        return system.solve(b)
 
-    def _factorise(self, snes: PETSc.SNES, x: PETSc.Vec) -> None:
-        rod = self.rod
-        snes.computeJacobian(x, self._matrix)
-        self._ksp.setOperators(self._matrix)
-        self._factored_shift = self.shift
+    def _factorise(self, system: System) -> None:
+        system.factorise()
+        self._factored_shift = system.shift()
         self._renew = False
         self.factorisations += 1
         if self._turning:
             self._reference[:] = self._quaternions()
             self._cosine[:], self._sine[:] = 1.0, 0.0
         if self.bit is not None:
-            for column, load in zip(self._columns, rod.bit_load_vectors(), strict=True):
-                column[:] = self._solve_kept(load)
+            for column, load in zip(self._columns, self.rod.bit_load_vectors(), strict=True):
+                column[:] = self._solve_kept(system, load)
             # a turn of the sections about their axis leaves these four numbers as they are
             depth, speed, _, _ = self._motion(self._columns[0][self._bit_node])
             _, _, turn, spin = self._motion(self._columns[1][self._bit_node])
@@ -215,12 +217,16 @@ class BitCoupledNewton:
             angle = 2 * (-d * p + c * q - b * r + a * s) / (a * a + b * b + c * c + d * d)
         else:
             angle = change[turn]
+        if self.rod.bends:  # along the hole
+            along, names = self.rod.bit_tangent, self.rod.ansatz
+            v = names.index("v1")
+            return float(change[:3] @ along), float(change[v : v + 3] @ along), float(angle), float(change[spin])
         return float(change[depth]), float(change[speed]), float(angle), float(change[spin])
 
     def _condense(self, y: Array, part: float) -> tuple[float, float]:
         """Solve the bit problem on the linearised string; returns the change of weight and torque."""
         assert self.bit is not None
-        turn, depth, speed, spin = self._bit_at
+        turn = self._bit_at[0]
         stage = self._stage[self._bit_node]
         change = -part * y[self._bit_node]
         if self._turning:
@@ -230,46 +236,42 @@ class BitCoupledNewton:
         g_speed, g_depth, g_spin, g_turn = self._compliance
         weight, torque = float(self._load[0]), float(self._load[1])
         angle = turn_between(self.start_rotation, stage[turn])
+        now_depth, now_speed, now_spin = self.rod.end_motion(self._stage)
         new_weight, new_torque = self.bit.respond(
-            stage[speed] + d_speed + g_speed * weight,
+            now_speed + d_speed + g_speed * weight,
             g_speed,
-            stage[depth] - self.start_depth + d_depth + g_depth * weight,
+            now_depth - self.start_depth + d_depth + g_depth * weight,
             g_depth,
-            stage[spin] + d_spin + g_spin * torque,
+            now_spin + d_spin + g_spin * torque,
             g_spin,
             angle + d_turn + g_turn * torque,
             g_turn,
         )
         return new_weight - weight, new_torque - torque
 
-    def solve(self, snes: PETSc.SNES, b: PETSc.Vec | None, x: PETSc.Vec) -> None:
-        """Newton iterations from the extrapolated start; sets the converged reason of ``snes``."""
+    def solve(self, system: System, x: Array) -> Outcome:
+        """Newton iterations from the extrapolated start; ``x`` (dofs,) are the unknowns of ``system``, in place."""
         rod, bit = self.rod, self.bit
-        values = x.getArray()
         if self.extrapolate and len(self._history) == 3:
             x1, x2, x3 = self._history
-            values[:] = 3 * (x1 - x2) + x3
-        f = self._residual
-        reason = PETSc.SNES.ConvergedReason.DIVERGED_MAX_IT
+            _extrapolate(x1, x2, x3, x)
+        outcome = Outcome.SLOW
         previous, renew_after, keep = np.inf, False, self.keep
         # where to go back to when a kept Jacobian leads astray: behind the last update that can be trusted
-        trusted, trusted_load, first = values.copy(), self._load.copy(), True
+        trusted, trusted_load, first = x.copy(), self._load.copy(), True
+        load = trusted_load.copy()
         for iteration in range(_MAX_ITERATIONS):
-            snes.computeFunction(x, f)
-            if iteration == 0:
-                self.only_shift = True
-                snes.computeJacobian(x, self._decoy)
-                self.only_shift = False
-                if abs(self.shift - self._factored_shift) > 1e-10 * self.shift:
-                    self._renew = True
+            f = system.residual()
+            if iteration == 0 and abs(system.shift() - self._factored_shift) > 1e-10 * system.shift():
+                self._renew = True
             fresh = self._renew or not keep
             if fresh:
-                self._factorise(snes, x)
+                self._factorise(system)
                 self._contraction = 1.0
             elif self._turning and iteration == 0:
                 _turns(self._reference, self._quaternions(), self._cosine, self._sine)
-            y = self._solve_kept(f.getArray(readonly=1))
-            part = self.stage_fraction
+            y = self._solve_kept(system, f)
+            part = system.stage_fraction
             if bit is not None:
                 d_weight, d_torque = self._condense(y, part)
                 y += self._columns[0] * (d_weight / part)
@@ -277,18 +279,18 @@ class BitCoupledNewton:
                 rod.set_bit_load(self._load[0] + d_weight, self._load[1] + d_torque)
             if self._turning:
                 _turn(y.reshape(-1, 13), self._cosine, self._sine, 1.0)
-            values -= y
+            x -= y
             self.iterations += 1
             size = _weighted(y, self._weight)
             if not np.isfinite(size):
-                reason = PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
+                outcome = Outcome.NAN
                 break
             if not first:
                 # below the tolerance it is round-off that is seen
                 if size > 1.0:
                     self._contraction = size / previous
                     if not fresh and self._contraction > _STALLED:
-                        values[:] = trusted
+                        x[:] = trusted
                         rod.set_bit_load(*trusted_load)
                         keep, first = False, True
                         continue
@@ -305,20 +307,18 @@ class BitCoupledNewton:
             else:
                 rate = min(1.0, 4 * self._contraction) if first else self._contraction
             if size < 1.0 or (rate < 0.5 and size * rate / (1 - rate) < 1.0):
-                reason = PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE
+                outcome = Outcome.CONVERGED
                 # reactions and powers are read from the state that the residual has seen last
                 if size > 1.0:
-                    snes.computeFunction(x, f)
+                    system.residual()
                 break
             if fresh or not first:
-                trusted[:], trusted_load[:] = values, self._load
+                trusted[:], trusted_load[:] = x, self._load
             previous, first = size, False
         self._renew = self._renew or renew_after
-        snes.setConvergedReason(reason)
-        if reason > 0:
-            self._history = [values.copy(), *self._history[:2]]
+        if outcome is Outcome.CONVERGED:
+            self._history = [x.copy(), *self._history[:2]]
         else:
             self.forget()
-
-    def reset(self, snes: PETSc.SNES) -> None:
-        """Nothing to keep between set-ups."""
+            rod.set_bit_load(*load)
+        return outcome

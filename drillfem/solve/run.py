@@ -51,7 +51,11 @@ def _run(
         from .direct import run_static
 
         return run_static(scene, writer, tell)
-    if engine != "petsc":
+    if engine == "soft-string":
+        from .soft_string import run_soft_string
+
+        result = run_soft_string(scene, writer, end, tell)
+    elif engine not in ("petsc", "compiled"):
         from .straight import run_condensed
 
         result = run_condensed(scene, writer, end, tell)

@@ -49,20 +49,37 @@ class Statics:
         n = len(a.x_names)
         self.V = lagrange(rod.mesh, rod.scene.mesh.degree, n)
         self.x = dolfinx.fem.Function(self.V)
-        terms = vw.static_terms(a, self.x, ufl.TestFunction(self.V), rod.s, rod.section, rod.loads, rod.on, rod.literal)
+        #: springs to the centreline of the hole (N/m2)
+        self.support = rod.constant(0.0)
+        terms = vw.static_terms(
+            a,
+            self.x,
+            ufl.TestFunction(self.V),
+            rod.s,
+            rod.section,
+            rod.loads,
+            rod.on,
+            rod.literal,
+            self.support if rod.bends else None,
+        )
         F = vw.total({k: v for k, v in terms.items() if k not in ("inertia", "damping", "friction")})
         self.residual = VectorForm(F)
         self.jacobian = MatrixForm(ufl.derivative(F, self.x, ufl.TrialFunction(self.V)))
         ends = rod.scene.ends
         held = []
         for node, kind in ((0, ends.top), (-1, ends.bottom)):
-            held += [int(rod.nodes[node]) * n + a.x_names.index(k) for k in _HELD[kind] if k in a.x_names]
+            if not (kind == "bit" and rod.bends):  # there the hole guides it
+                held += [int(rod.nodes[node]) * n + a.x_names.index(k) for k in _HELD[kind] if k in a.x_names]
         self.held = np.array(sorted(held), dtype=np.int32)
 
     def start(self, u: Array) -> Array:
         """Configuration part (nodes * fields) of a vector of unknowns of the rod."""
         a = self.rod.ansatz
         return u.reshape(-1, a.size)[:, : len(a.x_names)].reshape(-1).copy()
+
+    def _set(self, values: Array) -> None:
+        self.x.x.array[:] = values
+        self.rod.find_hole(values, len(self.rod.ansatz.x_names))
 
     def solve(
         self,
@@ -76,7 +93,7 @@ class Statics:
         A step that does not converge is halved (down to 1/64). Raises SimulationError if that does not help, with the
         load factor that was reached.
         """
-        fixed = x0[self.held].copy()
+        fixed, rod = x0[self.held].copy(), self.rod
         matrix = self.jacobian.create()
         snes = PETSc.SNES().create(self.rod.mesh.comm)
         prefix = f"drillfem_statics_{next(_serial)}_"
@@ -84,13 +101,15 @@ class Statics:
 
         def function(_: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
             values = x.getArray(readonly=1)
-            self.x.x.array[:] = values
+            self._set(values)
             out = f.getArray()
             self.residual(out)
+            if rod.wall is not None and rod.wall.trouble:
+                out[:] = np.nan
             out[self.held] = values[self.held] - fixed
 
         def tangent(_: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, P: PETSc.Mat) -> None:
-            self.x.x.array[:] = x.getArray(readonly=1)
+            self._set(x.getArray(readonly=1))
             self.jacobian(P)
             P.zeroRows(self.held, diag=1.0)
 

@@ -1,11 +1,11 @@
-"""Runs of a straight drilling string through the condensed engine."""
+"""Runs of strings that march in compiled loops: chunks of steps, rows, pictures and checkpoints between them."""
 
 from __future__ import annotations
 
 import math
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -26,12 +26,43 @@ from .guards import runaway
 _CHUNK_SECONDS, _FIRST_CHUNK = 0.25, 200
 
 
+class Engine(Protocol):
+    """A string that marches by itself; see `CondensedString`."""
+
+    count: int
+
+    @property
+    def time(self) -> float: ...
+    @property
+    def counters(self) -> dict[str, int]: ...
+    def sample(self) -> dict[str, float]: ...
+    def advance(self, steps: int, every: int = 1) -> dict[str, Array]: ...
+
+
+class Run(Protocol):
+    """A scene in such an engine, with the history and the fields of a result."""
+
+    energy_error: float
+    #: model, unknowns, and variables of the history with their units
+    model: str
+    dofs: int
+    variables: dict[str, str]
+
+    @property
+    def string(self) -> Engine: ...
+    def history(self, rows: dict[str, Any]) -> tuple[Array, dict[str, Array]]: ...
+    def fields(self) -> dict[str, Array]: ...
+    def save(self) -> dict[str, Any]: ...
+    def load(self, state: dict[str, Any]) -> None: ...
+
+
 class StraightRun:
     """A scene's string in the condensed engine, with the fields and the history of a rod."""
 
     def __init__(self, scene: Scene) -> None:
         announce()
         self.scene, self.line = scene, StraightString(scene)
+        self.model, self.dofs, self.variables = self.line.model, self.line.dofs, variables(True)
         drive, time = scene.top_drive, scene.time
 
         def top(times: Array) -> tuple[Array, Array]:
@@ -106,12 +137,11 @@ class StraightRun:
         self.scale = float(state["scale"])
 
 
-def run_condensed(
-    scene: Scene, writer_of: Callable[..., ResultWriter], until: float, progress: Callable[[float], None]
+def march(
+    scene: Scene, run: Run, writer_of: Callable[..., ResultWriter], until: float, progress: Callable[[float], None]
 ) -> Result:
     """March a scene to ``until``, writing as it goes."""
-    run = StraightRun(scene)
-    writer = writer_of(run.line.model, run.line.dofs, variables(True))
+    writer = writer_of(run.model, run.dofs, run.variables)
     string, start, step = run.string, scene.time.start, scene.time.step
     end = round((until - start) / step)
     every = round(scene.output.interval / step)
@@ -154,3 +184,10 @@ def run_condensed(
                 writer.checkpoint(t, run.save())
             progress(t)
         return writer.finish({**report(), "converged": True})
+
+
+def run_condensed(
+    scene: Scene, writer_of: Callable[..., ResultWriter], until: float, progress: Callable[[float], None]
+) -> Result:
+    """March a straight drilling string to ``until``, writing as it goes."""
+    return march(scene, StraightRun(scene), writer_of, until, progress)

@@ -1,0 +1,469 @@
+/* The compiled engine: kernels of the form compiler called element by element, and a direct solver for strings.
+
+   A string of n elements of degree d has one block of nx + nv unknowns per node: the configuration x, and the velocity
+   v. Its Jacobian is eliminated in three moves, each of them linear in n:
+
+   1. The kinematic rows (those of x) are collocated at the nodes: they couple x and v of one node only,
+      dx = P f_x + D dv. This leaves nv unknowns per node.
+   2. The d - 1 inner nodes of an element are condensed onto its two vertices.
+   3. What is left on the vertices is block tridiagonal.
+
+   Pivots are sought inside the blocks. Small matrices are stored by columns. Nothing here allocates: all arrays belong
+   to the caller. Rows of held unknowns are replaced by unit rows.
+
+   Kernels of the cells may have lanes (lanes.py): they do LANES elements at once, whose numbers lie side by side. */
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+/* Since DOLFINx 0.10 kernels take a seventh argument; those that take six do not look at it. */
+typedef void kernel(double *, const double *, const double *, const double *, const int *, const uint8_t *, void *);
+
+#define INLINE static inline __attribute__((always_inline))
+
+#if defined(__AVX512F__)
+#define LANES 8
+#elif defined(__AVX__)
+#define LANES 4
+#else
+#define LANES 2
+#endif
+
+/* DECLARATIONS */
+/* A coefficient of a form: `nodes` blocks per element, at `offset` among the numbers that kernels take. */
+struct field {
+    const double *values;
+    const int32_t *dofs; /* (cells, nodes) */
+    int32_t nodes, block, offset;
+};
+
+struct constant {
+    const double *value;
+    int32_t size;
+};
+
+/* One integral over one element, or over its facet. */
+struct action {
+    uintptr_t kernel;
+    int32_t facet;
+};
+
+/* A compiled form on a mesh of intervals. */
+struct form {
+    int32_t cells, nodes, block;
+    const int32_t *dofs;     /* (cells, nodes): nodes of the unknowns */
+    const double *geometry;  /* (cells, 2, 3) */
+    const struct field *fields;
+    const struct constant *constants;
+    int32_t n_fields, n_constants;
+    const int32_t *first;    /* (cells + 1): the actions of a cell are first[c] .. first[c + 1] */
+    const struct action *actions;
+    double *w, *c;           /* work: coefficients of an element, all constants */
+    uintptr_t lanes;         /* kernel with lanes of every cell, or 0 */
+    int32_t width, entries;  /* numbers that it takes of an element, numbers that it makes */
+    double *w_lanes, *x_lanes, *A_lanes; /* work, aligned for it */
+};
+
+/* A string whose Jacobian is factorised. Elements e count from the top; vertex e is the top of element e. */
+struct solver {
+    int32_t n, d, nx, nv;
+    const int32_t *element;  /* (n): place in the string of a cell of the mesh */
+    const int32_t *local;    /* (n, d + 1): its nodes, as the kernel counts them: top, bottom, inner ones */
+    const int32_t *node;     /* (n, d + 1): the same, as the unknowns count them */
+    const uint8_t *held;     /* (dofs): rows that are replaced */
+    int32_t n_extra;         /* entries to add besides the form, each within the block of a vertex of element `of` */
+    const int32_t *extra;    /* (n_extra, 3): e, row and column in its element matrix */
+    const double *extra_value;
+    double *P, *D;           /* (nodes, nx, nx), (nodes, nv, nx) */
+    double *K;               /* (n, (d+1) nv, (d+1) nv): elements without x */
+    double *B;               /* (n, (d+1) nx, (d+1) nv): what f_x does to the rows of v */
+    double *I, *H, *G;       /* (n, ni, ni), (n, ni, 2 nv), (n, 2 nv, ni): inner inverse; couplings */
+    double *S, *L, *U;       /* (n + 1, nv, nv), (n, nv, nv), (n, nv, nv) of the vertices */
+    double *g, *z;           /* work: ((n + 1) nv), (n ni) */
+};
+
+void assemble_vector(const struct form *form, double *out, int32_t size);
+double assemble_scalar(const struct form *form);
+int factorise(const struct solver *s, const struct form *form);
+void solve(const struct solver *s, const double *b, double *y);
+int lanes(void);
+void stage(int32_t size, const double *x, const double *x0, double a, double b, const double *rate, double *u,
+           double *u_dot);
+/* END */
+
+int lanes(void)
+{
+    return LANES;
+}
+
+/* ---- forms ------------------------------------------------------------------------------------------------------ */
+
+static void gather_constants(const struct form *f)
+{
+    double *c = f->c;
+    for (int i = 0; i < f->n_constants; i++)
+        for (int k = 0; k < f->constants[i].size; k++)
+            *c++ = f->constants[i].value[k];
+}
+
+/* Coefficients of a cell, each `stride` numbers behind the last */
+INLINE void gather(const struct form *f, int cell, double *w, const int stride)
+{
+    for (int i = 0; i < f->n_fields; i++) {
+        const struct field *field = f->fields + i;
+        const int block = field->block;
+        double *to = w + field->offset * stride;
+        const int32_t *dofs = field->dofs + cell * field->nodes;
+        for (int k = 0; k < field->nodes; k++) {
+            const double *from = field->values + (int64_t)dofs[k] * block;
+            for (int j = 0; j < block; j++, to += stride)
+                *to = from[j];
+        }
+    }
+}
+
+/* Adds to A what the integrals of a cell that have no lanes make of it */
+static void run(const struct form *f, int cell, double *A)
+{
+    if (f->first[cell] == f->first[cell + 1])
+        return;
+    gather(f, cell, f->w, 1);
+    for (int i = f->first[cell]; i < f->first[cell + 1]; i++) {
+        const int facet = f->actions[i].facet;
+        ((kernel *)f->actions[i].kernel)(A, f->w, f->c, f->geometry + 6 * cell, &facet, NULL, NULL);
+    }
+}
+
+/* Cells cell .. cell + LANES - 1 into A_lanes; the last one stands in for those beyond it. Returns how many there are. */
+static int run_lanes(const struct form *f, int cell)
+{
+    const int count = f->cells - cell < LANES ? f->cells - cell : LANES, facet = 0;
+    for (int l = 0; l < LANES; l++) {
+        const int of = cell + (l < count ? l : count - 1);
+        gather(f, of, f->w_lanes + l, LANES);
+        for (int k = 0; k < 6; k++)
+            f->x_lanes[k * LANES + l] = f->geometry[6 * of + k];
+    }
+    memset(f->A_lanes, 0, sizeof(double) * f->entries * LANES);
+    ((kernel *)f->lanes)(f->A_lanes, f->w_lanes, f->c, f->x_lanes, &facet, NULL, NULL);
+    return count;
+}
+
+void assemble_vector(const struct form *f, double *out, int32_t size)
+{
+    const int n = f->nodes, block = f->block;
+    double b[n * block];
+    memset(out, 0, size * sizeof(double));
+    gather_constants(f);
+    for (int cell = 0; f->lanes && cell < f->cells; cell += LANES) {
+        const int count = run_lanes(f, cell);
+        for (int l = 0; l < count; l++)
+            for (int k = 0; k < n; k++) {
+                double *to = out + (int64_t)f->dofs[(cell + l) * n + k] * block;
+                const double *from = f->A_lanes + k * block * LANES + l;
+                for (int i = 0; i < block; i++)
+                    to[i] += from[i * LANES];
+            }
+    }
+    for (int cell = 0; cell < f->cells; cell++) {
+        if (f->first[cell] == f->first[cell + 1])
+            continue;
+        memset(b, 0, sizeof b);
+        run(f, cell, b);
+        for (int k = 0; k < n; k++) {
+            double *to = out + (int64_t)f->dofs[cell * n + k] * block;
+            for (int i = 0; i < block; i++)
+                to[i] += b[k * block + i];
+        }
+    }
+}
+
+double assemble_scalar(const struct form *f)
+{
+    double sum = 0.0;
+    gather_constants(f);
+    for (int cell = 0; f->lanes && cell < f->cells; cell += LANES) {
+        const int count = run_lanes(f, cell);
+        for (int l = 0; l < count; l++)
+            sum += f->A_lanes[l];
+    }
+    for (int cell = 0; cell < f->cells; cell++)
+        run(f, cell, &sum);
+    return sum;
+}
+
+/* ---- small dense matrices, by columns --------------------------------------------------------------------------- */
+
+/* y (m) += sign A (m, n) x (n) */
+INLINE void add_product(int m, int n, double sign, const double *restrict A, const double *restrict x,
+                        double *restrict y)
+{
+    for (int j = 0; j < n; j++) {
+        const double xj = sign * x[j];
+        for (int i = 0; i < m; i++)
+            y[i] += A[j * m + i] * xj;
+    }
+}
+
+/* C (m, n) += sign A (m, k) B (k, n) */
+INLINE void add_matrix_product(int m, int k, int n, double sign, const double *restrict A, const double *restrict B,
+                               double *restrict C)
+{
+    for (int j = 0; j < n; j++)
+        add_product(m, k, sign, A, B + j * k, C + j * m);
+}
+
+/* A (n, n) becomes its inverse, by Gauss-Jordan elimination with row pivots; numbers that are none where it has none */
+static void invert(int n, double *A)
+{
+    int row[n];
+    for (int k = 0; k < n; k++) {
+        int p = k;
+        for (int i = k + 1; i < n; i++)
+            if (fabs(A[k * n + i]) > fabs(A[k * n + p]))
+                p = i;
+        row[k] = p;
+        if (p != k)
+            for (int j = 0; j < n; j++) {
+                const double a = A[j * n + k];
+                A[j * n + k] = A[j * n + p];
+                A[j * n + p] = a;
+            }
+        const double pivot = 1.0 / A[k * n + k];
+        double column[n];
+        memcpy(column, A + k * n, sizeof column);
+        column[k] = 0.0;
+        memset(A + k * n, 0, sizeof column);
+        A[k * n + k] = 1.0;
+        for (int j = 0; j < n; j++) {
+            const double a = A[j * n + k] *= pivot;
+            for (int i = 0; i < n; i++)
+                A[j * n + i] -= column[i] * a;
+        }
+    }
+    for (int k = n - 1; k >= 0; k--)
+        if (row[k] != k)
+            for (int i = 0; i < n; i++) {
+                const double a = A[k * n + i];
+                A[k * n + i] = A[row[k] * n + i];
+                A[row[k] * n + i] = a;
+            }
+}
+
+/* ---- factorisation ---------------------------------------------------------------------------------------------- */
+
+/* Element matrix of element e by rows of v (local order): K (nr, nr) and X (nr, nxe); adds to P and D of its nodes what
+   will be their J_xx and J_xv. Returns the largest entry that couples x-rows to other nodes, relative to their own. */
+static double split(const struct solver *s, int e, const double *A, double *K, double *X)
+{
+    const int nx = s->nx, nv = s->nv, size = nx + nv, nn = s->d + 1, N = nn * size, nr = nn * nv;
+    const int32_t *local = s->local + e * nn, *node = s->node + e * nn;
+    double own = 0.0, other = 0.0;
+    for (int a = 0; a < nn; a++) {
+        const double *rows = A + local[a] * size * N;
+        for (int i = 0; i < nx; i++)
+            for (int b = 0; b < nn; b++)
+                for (int j = 0; j < size; j++) {
+                    const double value = rows[i * N + local[b] * size + j], much = fabs(value);
+                    if (a != b) {
+                        other = much > other ? much : other;
+                        continue;
+                    }
+                    own = much > own ? much : own;
+                    if (j < nx)
+                        s->P[(node[a] * nx + j) * nx + i] += value;
+                    else
+                        s->D[(node[a] * nv + j - nx) * nx + i] -= value;
+                }
+        for (int i = 0; i < nv; i++) {
+            const int r = a * nv + i;
+            if (s->held[node[a] * size + nx + i]) {
+                for (int b = 0; b < nn; b++) {
+                    for (int j = 0; j < nx; j++)
+                        X[(b * nx + j) * nr + r] = 0.0;
+                    for (int j = 0; j < nv; j++)
+                        K[(b * nv + j) * nr + r] = 0.0;
+                }
+                K[r * nr + r] = 1.0;
+                continue;
+            }
+            for (int b = 0; b < nn; b++) {
+                const double *from = rows + (nx + i) * N + local[b] * size;
+                for (int j = 0; j < nx; j++)
+                    X[(b * nx + j) * nr + r] = from[j];
+                for (int j = 0; j < nv; j++)
+                    K[(b * nv + j) * nr + r] = from[nx + j];
+            }
+        }
+    }
+    return own > 0.0 ? other / own : other;
+}
+
+/* Returns 0, or 1 where the kinematic rows reach beyond their nodes, so that this elimination does not apply. */
+int factorise(const struct solver *s, const struct form *f)
+{
+    const int n = s->n, nx = s->nx, nv = s->nv, size = nx + nv, nn = s->d + 1;
+    const int N = nn * size, nr = nn * nv, nxe = nn * nx, ne = 2 * nv, ni = nr - ne, nodes = n * s->d + 1;
+    double A[N * N], X[nr * nxe], inner[nr * ni + 1];
+    double reach = 0.0;
+    gather_constants(f);
+    memset(s->P, 0, sizeof(double) * nodes * nx * nx);
+    memset(s->D, 0, sizeof(double) * nodes * nv * nx);
+    memset(s->S, 0, sizeof(double) * (n + 1) * nv * nv);
+    for (int cell = 0; cell < f->cells; cell += LANES) {
+        const int count = f->lanes ? run_lanes(f, cell) : f->cells - cell < LANES ? f->cells - cell : LANES;
+        for (int l = 0; l < count; l++) {
+            const int e = s->element[cell + l];
+            for (int k = 0; k < N * N; k++)
+                A[k] = f->lanes ? f->A_lanes[k * LANES + l] : 0.0;
+            run(f, cell + l, A);
+            for (int k = 0; k < s->n_extra; k++)
+                if (s->extra[3 * k] == e)
+                    A[s->extra[3 * k + 1] * N + s->extra[3 * k + 2]] += s->extra_value[k];
+            const double beyond = split(s, e, A, s->K + (int64_t)e * nr * nr, s->B + (int64_t)e * nr * nxe);
+            reach = beyond > reach ? beyond : reach;
+        }
+    }
+    for (int k = 0; k < nodes; k++) {
+        double D[nx * nv];
+        invert(nx, s->P + k * nx * nx);
+        memcpy(D, s->D + k * nv * nx, sizeof D);
+        memset(s->D + k * nv * nx, 0, sizeof D);
+        add_matrix_product(nx, nx, nv, 1.0, s->P + k * nx * nx, D, s->D + k * nv * nx);
+    }
+    for (int e = 0; e < n; e++) {
+        const int32_t *node = s->node + e * nn;
+        double *K = s->K + (int64_t)e * nr * nr, *B = s->B + (int64_t)e * nr * nxe;
+        /* without x: K += X D, and B = X P */
+        memcpy(X, B, sizeof X);
+        memset(B, 0, sizeof X);
+        for (int b = 0; b < nn; b++) {
+            add_matrix_product(nr, nx, nv, 1.0, X + b * nx * nr, s->D + node[b] * nv * nx, K + b * nv * nr);
+            add_matrix_product(nr, nx, nx, 1.0, X + b * nx * nr, s->P + node[b] * nx * nx, B + b * nx * nr);
+        }
+        /* without inner nodes: I their inverse, H = K_vi, G = I K_iv, and K_vv -= H G */
+        double *I = s->I + (int64_t)e * ni * ni, *H = s->H + (int64_t)e * ni * ne, *G = s->G + (int64_t)e * ne * ni;
+        for (int j = 0; j < ni; j++) {
+            memcpy(H + j * ne, K + (ne + j) * nr, ne * sizeof(double));
+            memcpy(I + j * ni, K + (ne + j) * nr + ne, ni * sizeof(double));
+        }
+        for (int j = 0; j < ne; j++)
+            memcpy(inner + j * ni, K + j * nr + ne, ni * sizeof(double));
+        invert(ni, I);
+        memset(G, 0, sizeof(double) * ne * ni);
+        add_matrix_product(ni, ni, ne, 1.0, I, inner, G);
+        double *S = s->S + (int64_t)e * nv * nv, *L = s->L + (int64_t)e * nv * nv, *U = s->U + (int64_t)e * nv * nv;
+        for (int j = 0; j < ne; j++) {
+            double column[ne];
+            memcpy(column, K + j * nr, sizeof column);
+            add_product(ne, ni, -1.0, H, G + j * ni, column);
+            double *top = j < nv ? S + j * nv : U + (j - nv) * nv, *bottom = j < nv ? L + j * nv : S + j * nv;
+            for (int i = 0; i < nv; i++) {
+                top[i] = column[i] + (j < nv ? top[i] : 0.0);
+                bottom[i] = column[nv + i] + (j < nv ? 0.0 : bottom[i]);
+            }
+        }
+    }
+    /* S becomes the inverse of its pivot block, L = L S^-1 */
+    for (int e = 0; e <= n; e++) {
+        double *S = s->S + (int64_t)e * nv * nv, *L = s->L + (int64_t)e * nv * nv;
+        double old[nv * nv];
+        invert(nv, S);
+        if (e == n)
+            break;
+        memcpy(old, L, sizeof old);
+        memset(L, 0, sizeof old);
+        add_matrix_product(nv, nv, nv, 1.0, old, S, L);
+        add_matrix_product(nv, nv, nv, -1.0, L, s->U + (int64_t)e * nv * nv, S + nv * nv);
+    }
+    return reach > 1e-9;
+}
+
+/* ---- solution --------------------------------------------------------------------------------------------------- */
+
+INLINE void solve_sized(const struct solver *s, const double *restrict b, double *restrict y, const int nx, const int nv,
+                        const int d)
+{
+    const int n = s->n, size = nx + nv, nn = d + 1, nr = nn * nv, nxe = nn * nx, ne = 2 * nv, ni = nr - ne;
+    double *restrict g = s->g, *restrict z = s->z;
+    memset(g, 0, sizeof(double) * (n + 1) * nv);
+    for (int e = 0; e < n; e++) {
+        const int32_t *node = s->node + e * nn;
+        const int last = e == n - 1; /* the bottom vertex belongs to the next element, if there is one */
+        double t[nr], f_x[nxe];
+        for (int a = 0; a < nn; a++) {
+            const double *from = b + node[a] * size;
+            for (int i = 0; i < nx; i++)
+                f_x[a * nx + i] = from[i];
+            for (int i = 0; i < nv; i++)
+                t[a * nv + i] = a == 1 && !last ? 0.0 : from[nx + i];
+        }
+        add_product(nr, nxe, -1.0, s->B + (int64_t)e * nr * nxe, f_x, t);
+        double *ze = z + e * ni;
+        for (int i = 0; i < ni; i++)
+            ze[i] = 0.0;
+        add_product(ni, ni, 1.0, s->I + (int64_t)e * ni * ni, t + ne, ze);
+        add_product(ne, ni, -1.0, s->H + (int64_t)e * ni * ne, ze, t);
+        for (int i = 0; i < ne; i++)
+            g[e * nv + i] += t[i];
+    }
+    for (int e = 0; e < n; e++)
+        add_product(nv, nv, -1.0, s->L + (int64_t)e * nv * nv, g + e * nv, g + (e + 1) * nv);
+    for (int e = n; e >= 0; e--) {
+        double *ge = g + e * nv, t[nv];
+        if (e < n)
+            add_product(nv, nv, -1.0, s->U + (int64_t)e * nv * nv, ge + nv, ge);
+        for (int i = 0; i < nv; i++)
+            t[i] = 0.0;
+        add_product(nv, nv, 1.0, s->S + (int64_t)e * nv * nv, ge, t);
+        for (int i = 0; i < nv; i++)
+            ge[i] = t[i];
+    }
+    for (int e = 0; e < n; e++) {
+        double *ze = z + e * ni;
+        add_product(ni, ne, -1.0, s->G + (int64_t)e * ne * ni, g + e * nv, ze);
+        for (int a = e == 0 ? 0 : 1; a < nn; a++) {
+            const int node = s->node[e * nn + a];
+            const double *restrict f_x = b + node * size, *restrict v = a < 2 ? g + (e + a) * nv : ze + (a - 2) * nv;
+            double *to = y + node * size, t[nx];
+            for (int i = 0; i < nx; i++)
+                t[i] = 0.0;
+            add_product(nx, nx, 1.0, s->P + node * nx * nx, f_x, t);
+            add_product(nx, nv, 1.0, s->D + node * nv * nx, v, t);
+            for (int i = 0; i < nx; i++)
+                to[i] = t[i];
+            for (int i = 0; i < nv; i++)
+                to[nx + i] = v[i];
+        }
+    }
+}
+
+/* y = J^-1 b; y may not be b */
+void solve(const struct solver *s, const double *b, double *y)
+{
+    /* loops of known length are several times as fast */
+    if (s->nx == 7 && s->nv == 6 && s->d == 3)
+        solve_sized(s, b, y, 7, 6, 3);
+    else if (s->nx == 7 && s->nv == 6 && s->d == 2)
+        solve_sized(s, b, y, 7, 6, 2);
+    else if (s->nx == 3 && s->nv == 3 && s->d == 3)
+        solve_sized(s, b, y, 3, 3, 3);
+    else if (s->nx == 2 && s->nv == 2 && s->d == 3)
+        solve_sized(s, b, y, 2, 2, 3);
+    else
+        solve_sized(s, b, y, s->nx, s->nv, s->d);
+}
+
+/* ---- steps ------------------------------------------------------------------------------------------------------ */
+
+/* State and rate of a stage: u = x0 + a (x - x0) and u-dot = b (x - x0) + rate; rate may be NULL (0) */
+void stage(int32_t size, const double *x, const double *x0, double a, double b, const double *rate, double *u,
+           double *u_dot)
+{
+    for (int i = 0; i < size; i++) {
+        const double change = x[i] - x0[i];
+        u[i] = a == 1.0 ? x[i] : x0[i] + a * change;
+        u_dot[i] = b * change + (rate ? rate[i] : 0.0);
+    }
+}

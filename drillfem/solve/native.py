@@ -1,0 +1,294 @@
+"""Compiled loops over the elements of a string: forms by their FFCx kernels, and a direct solver (`native.c`).
+
+The kernels are those that DOLFINx calls. What is saved is everything around them: coefficients are read straight from
+the vectors, element matrices go straight into the elimination, and Python is entered once per form.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import logging
+import sysconfig
+import tempfile
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import cffi
+import dolfinx
+import numpy as np
+import numpy.typing as npt
+import ufl
+
+from ..compat import Array, compile_form, jit_options
+from ..models.rod import Rod
+from .lanes import DECLARATIONS, kernel_names, with_lanes
+
+log = logging.getLogger("drillfem")
+I4 = npt.NDArray[np.int32]
+_SOURCE = Path(__file__).with_name("native.c")
+
+
+def _load(source: str, declarations: str) -> Any:
+    """A compiled library: a module with ``lib`` and ``ffi``. Compiled once per source and processor."""
+    options = jit_options()
+    # as the form compiler, but with fused products, and no errno in the way of SIMD roots
+    arguments = ["-std=c17", *options["cffi_extra_compile_args"], "-ffp-contract=fast", "-fno-math-errno"]
+    key = hashlib.sha256(repr((source, declarations, arguments, cffi.__version__)).encode()).hexdigest()[:16]
+    name, folder = f"drillfem_native_{key}", Path(options["cache_dir"])
+    path = folder / (name + sysconfig.get_config_var("EXT_SUFFIX"))
+    if not path.exists():
+        builder = cffi.FFI()
+        builder.cdef(declarations)
+        builder.set_source(name, source, extra_compile_args=arguments)
+        folder.mkdir(parents=True, exist_ok=True)
+        # moved into place whole: several processes may do so at once
+        with tempfile.TemporaryDirectory(dir=folder) as work:
+            Path(builder.compile(tmpdir=work)).replace(path)
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@cache
+def library() -> Any:
+    """The loops of `native.c`."""
+    source = _SOURCE.read_text(encoding="utf-8")
+    return _load(source, source.split("/* DECLARATIONS */")[1].split("/* END */")[0])
+
+
+def _kernel_with_lanes(form: dolfinx.fem.Form, number: int) -> tuple[int, Any]:
+    """Address of a kernel of a form rewritten to do several elements at once, and what keeps it alive; or 0."""
+    code = Path(form.module.__file__.split(".")[0]).with_suffix(".c")
+    try:
+        text = code.read_text(encoding="utf-8")
+        module = _load(with_lanes(text, kernel_names(text)[number : number + 1]), DECLARATIONS)
+    except (OSError, ValueError, cffi.VerificationError) as error:
+        log.debug("%s: no lanes (%s)", code, error)
+        return 0, None
+    return int(module.lib.kernel_address(0)), module
+
+
+def _aligned(size: int) -> Array:
+    """Zeros (size,) that begin where SIMD units want them to."""
+    room = np.zeros(size + 8)
+    return room[-room.ctypes.data // 8 % 8 :][:size]
+
+
+def _entities(mesh: dolfinx.mesh.Mesh, kind: str, data: Any, number: int) -> Iterator[tuple[int, int]]:
+    """Cells of an integral, and the local number of their facet (0 for an integral over cells)."""
+    of_cell = kind == "cell"
+    mesh.topology.create_connectivity(0, 1)
+    mesh.topology.create_connectivity(1, 0)
+    if number != -1:
+        found = data.find(number) if hasattr(data, "find") else dict(data)[number]
+    elif of_cell:
+        found = np.arange(mesh.topology.index_map(1).size_local)
+    else:
+        found = dolfinx.mesh.exterior_facet_indices(mesh.topology)
+    cells, facets = mesh.topology.connectivity(0, 1), mesh.topology.connectivity(1, 0)
+    for entity in found.tolist():
+        if of_cell:
+            yield entity, 0
+        else:
+            (cell,) = cells.links(entity)
+            yield int(cell), facets.links(cell).tolist().index(entity)
+
+
+class _Form:
+    """A form in the shape that the loops read. Everything that they point to is kept alive here."""
+
+    def __init__(self, form: ufl.Form, rod: Rod) -> None:
+        self.form = compile_form(form)
+        native = library()
+        self._lib, self._ffi = native.lib, native.ffi
+        self._keep: list[Any] = [rod.mesh]
+        c = self.c = self._ffi.new("struct form *")
+        nodes = np.ascontiguousarray(rod.V.dofmap.list, dtype=np.int32)
+        c.cells, c.nodes = nodes.shape
+        c.block = rod.ansatz.size
+        c.dofs = self._pointer(nodes, "int32_t *")
+        geometry = rod.mesh.geometry
+        c.geometry = self._pointer(np.ascontiguousarray(geometry.x[geometry.dofmap]), "double *")
+        compiled = self.form.ufcx_form
+        self._fields(form, compiled)
+        self._constants(form)
+        self._actions(form, compiled, rod.mesh)
+
+    def _pointer(self, array: Any, kind: str) -> Any:
+        self._keep.append(array)
+        return self._ffi.cast(kind, array.ctypes.data)
+
+    def _fields(self, form: ufl.Form, compiled: Any) -> None:
+        ffi, c = self._ffi, self.c
+        used = [
+            form.coefficients()[compiled.original_coefficient_positions[i]] for i in range(compiled.num_coefficients)
+        ]
+        fields = ffi.new("struct field[]", max(len(used), 1))
+        offset = 0
+        for field, f in zip(fields, used, strict=False):
+            dofmap = f.function_space.dofmap
+            dofs = np.ascontiguousarray(dofmap.list, dtype=np.int32)
+            field.values = self._pointer(f.x.array, "double *")
+            self._keep.append(f)
+            field.dofs = self._pointer(dofs, "int32_t *")
+            field.nodes, field.block, field.offset = dofs.shape[1], dofmap.index_map_bs, offset
+            offset += dofs.shape[1] * dofmap.index_map_bs
+        self._keep.append(fields)
+        c.fields, c.n_fields = fields, len(used)
+        c.w = self._pointer(np.zeros(max(offset, 1)), "double *")
+        c.width = offset
+
+    def _constants(self, form: ufl.Form) -> None:
+        ffi, c = self._ffi, self.c
+        used = form.constants()
+        constants = ffi.new("struct constant[]", max(len(used), 1))
+        for constant, value in zip(constants, used, strict=False):
+            # the very memory that Constant.value writes to
+            constant.value = self._pointer(value.value, "double *")
+            constant.size = value.value.size
+            self._keep.append(value)
+        self._keep.append(constants)
+        c.constants, c.n_constants = constants, len(used)
+        c.c = self._pointer(np.zeros(max(sum(value.value.size for value in used), 1)), "double *")
+
+    def _actions(self, form: ufl.Form, compiled: Any, mesh: Any) -> None:
+        ffi, c = self._ffi, self.c
+        where: list[list[tuple[int, int]]] = [[] for _ in range(c.cells)]
+        ((_, data),) = form.subdomain_data().items()
+        begins = compiled.form_integral_offsets
+        if begins[1] - begins[0] == 1 and compiled.form_integral_ids[begins[0]] == -1:
+            # the one integral over all cells
+            c.lanes, module = _kernel_with_lanes(self.form, begins[0])
+            self._keep.append(module)
+        for kind, name in ((0, "cell"), (1, "exterior_facet")):
+            if kind == 0 and c.lanes:
+                continue
+            for i in range(begins[kind], begins[kind + 1]):
+                kernel = compiled.form_integrals[i].tabulate_tensor_float64
+                address = int(self.form.module.ffi.cast("uintptr_t", kernel))
+                for cell, facet in _entities(mesh, name, data[name][0], compiled.form_integral_ids[i]):
+                    where[cell].append((address, facet))
+        actions = ffi.new("struct action[]", max(sum(map(len, where)), 1))
+        for action, (address, facet) in zip(actions, (a for cell in where for a in cell), strict=False):
+            action.kernel, action.facet = address, facet
+        first = np.concatenate([[0], np.cumsum([len(cell) for cell in where])]).astype(np.int32)
+        lanes = self._lib.lanes()
+        c.entries = (c.nodes * c.block) ** compiled.rank
+        for work, size in (("w_lanes", c.width), ("x_lanes", 6), ("A_lanes", c.entries)):
+            setattr(c, work, self._pointer(_aligned(max(size, 1) * lanes), "double *"))
+        self._keep.append(actions)
+        c.actions, c.first = actions, self._pointer(first, "int32_t *")
+
+
+class NativeVector(_Form):
+    """A linear form; the like of :class:`drillfem.compat.VectorForm`."""
+
+    def __call__(self, out: Array) -> Array:
+        """Assemble into ``out`` (dofs), which is overwritten."""
+        self._lib.assemble_vector(self.c, self._ffi.from_buffer("double[]", out), out.size)
+        return out
+
+
+class NativeScalar(_Form):
+    """A functional; the like of :class:`drillfem.compat.ScalarForm`."""
+
+    def __call__(self) -> float:
+        return float(self._lib.assemble_scalar(self.c))
+
+
+class NativeSolver(_Form):
+    """Factorises the Jacobian of a rod and solves with it: condensation to the vertices, a block tridiagonal system.
+
+    ``held``: dofs whose rows are unit rows. ``extra``: entries (row dof, column dof) to add besides the form, at a node
+    that is a vertex; their values (n,) go into ``extra_value``.
+    """
+
+    def __init__(self, form: ufl.Form, rod: Rod, extra: npt.ArrayLike = ()) -> None:
+        super().__init__(form, rod)
+        ffi, a = self._ffi, rod.ansatz
+        s = self.s = ffi.new("struct solver *")
+        nodes, block = rod.V.dofmap.list, a.size
+        n, count = nodes.shape
+        nx, nv, d = len(a.x_names), len(a.v_names), count - 1
+        # from the top down; in an element: top, bottom, inner nodes
+        place = rod.V.tabulate_dof_coordinates()[:, 0][nodes]
+        order = np.argsort(place.mean(axis=1))
+        element = np.empty(n, dtype=np.int32)
+        element[order] = np.arange(n)
+        along = np.argsort(place[order], axis=1)
+        local = np.concatenate([along[:, :1], along[:, -1:], along[:, 1:-1]], axis=1).astype(np.int32)
+        node = np.take_along_axis(nodes[order], local, axis=1).astype(np.int32)
+        held = np.zeros(rod.size, dtype=np.uint8)
+        held[rod.constrained] = 1
+        if any(held.reshape(-1, block)[:, :nx].ravel()) or np.any(held.reshape(-1, block)[node[1:, 0]]):
+            raise ValueError("the compiled engine holds velocities at the ends only")
+        s.n, s.d, s.nx, s.nv = n, d, nx, nv
+        s.element = self._pointer(element, "int32_t *")
+        s.local, s.node = self._pointer(local, "int32_t *"), self._pointer(node, "int32_t *")
+        s.held = self._pointer(held, "uint8_t *")
+        self._extra(np.asarray(extra, dtype=np.int64).reshape(-1, 2), node, local)
+        inner, rows = (d - 1) * nv, (d + 1) * nv
+        sizes = {
+            "P": (n * d + 1) * nx * nx,
+            "D": (n * d + 1) * nx * nv,
+            "K": n * rows * rows,
+            "B": n * rows * (d + 1) * nx,
+            "I": n * inner * inner,
+            "H": n * inner * 2 * nv,
+            "G": n * inner * 2 * nv,
+            "S": (n + 1) * nv * nv,
+            "L": n * nv * nv,
+            "U": n * nv * nv,
+            "g": (n + 1) * nv,
+            "z": n * inner,
+        }
+        for name, size in sizes.items():
+            setattr(s, name, self._pointer(np.zeros(max(size, 1)), "double *"))
+        self._y = np.zeros(rod.size)
+        self._to = ffi.from_buffer("double[]", self._y)
+
+    def _extra(self, entries: npt.NDArray[np.int64], node: I4, local: I4) -> None:
+        block = self.c.block
+        found = np.zeros((len(entries), 3), dtype=np.int32)
+        for k, (row, column) in enumerate(entries.tolist()):
+            e, a = np.argwhere(node[:, :2] == row // block)[0]
+            if row // block != column // block:
+                raise ValueError("an extra entry couples two nodes")
+            first = local[e, a] * block
+            found[k] = e, first + row % block, first + column % block
+        self.extra_value: Array = np.zeros(max(len(entries), 1))
+        self.s.n_extra = len(entries)
+        self.s.extra = self._pointer(found, "int32_t *")
+        self.s.extra_value = self._pointer(self.extra_value, "double *")
+
+    def factorise(self) -> None:
+        """Assemble and factorise the Jacobian at the present values of its coefficients."""
+        if self._lib.factorise(self.s, self.c):
+            raise ValueError("the kinematic rows of this rod reach beyond their nodes: use time.engine = 'petsc'")
+
+    def solve(self, b: Array) -> Array:
+        """J^-1 b, shape (dofs,): a view, valid until the next."""
+        self._lib.solve(self.s, self._ffi.from_buffer("double[]", b), self._to)
+        return self._y
+
+
+class NativeStage:
+    """State u = x0 + a (x - x0) and rate u_dot = b (x - x0) + rate of a stage; all arrays (dofs,), kept and written."""
+
+    def __init__(self, x: Array, x0: Array, rate: Array, u: Array, u_dot: Array) -> None:
+        native = library()
+        self._keep = (x, x0, rate, u, u_dot)
+        self._stage, self._null = native.lib.stage, native.ffi.NULL
+        self._size = x.size
+        self._x, self._x0, self._rate, self._u, self._u_dot = (
+            native.ffi.from_buffer("double[]", array) for array in self._keep
+        )
+
+    def __call__(self, a: float, b: float, with_rate: bool) -> None:
+        rate = self._rate if with_rate else self._null
+        self._stage(self._size, self._x, self._x0, a, b, rate, self._u, self._u_dot)

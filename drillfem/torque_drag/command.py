@@ -1,0 +1,145 @@
+"""`drillfem torque-drag`: hook load, torque and side force of a scene's string, operation by operation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import SceneError
+from ..models.soft_string import Line, line_of
+from ..results.atomic import replacing, write_json
+from ..results.manifest import check_new_folder
+from ..scene.units import to_si
+from .limits import limits
+from .operation import OPERATIONS, Profile, deepest, operations_of
+from .report import Broomstick, Study, buckling_text, dataset, draw, print_table, write_csv
+from .soft import greatest_weight, hook_loads, lock_up_depth, soft_string, stations
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from ..scene import Scene
+
+METHODS = ("soft", "stations")
+_TRIPS = ("rotating", "tripping-out", "tripping-in")
+
+
+def _load(text: str | None, unit: str, option: str) -> float | None:
+    """A load such as ``50 kN`` or ``50000`` in SI units, not negative. Raises SceneError."""
+    if text is None:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        try:
+            value = to_si(text, unit)
+        except ValueError as error:
+            raise SceneError(f"{option} {text!r}: must be a number in {unit}, or with such a unit ({error})") from None
+    if not value >= 0:
+        raise SceneError(f"{option} {text!r}: must be >= 0 {unit}")
+    return value
+
+
+def study(
+    scene: Scene,
+    operations: list[str] | None = None,
+    methods: list[str] | None = None,
+    weight_on_bit: float | None = None,
+    torque_on_bit: float | None = None,
+    friction: str = "dynamic",
+    buckled: bool = True,
+) -> Study:
+    """All that the command shows, for a scene. Raises SceneError."""
+    for method in methods or ():
+        if method not in METHODS:
+            raise SceneError(f"--method {method!r}: must be one of {', '.join(METHODS)}")
+    if friction not in ("dynamic", "static"):
+        raise SceneError(f"--friction {friction!r}: must be one of dynamic, static")
+    line = line_of(scene)
+    wanted = operations_of(scene, operations, weight_on_bit, torque_on_bit)
+    notes = []
+    missing = [o.title for o in OPERATIONS.values() if not operations and o.name not in {w.name for w in wanted}]
+    if missing:
+        notes.append(f"left out, for want of a weight on bit (--weight-on-bit): {', '.join(missing)}")
+    profiles: dict[str, list[Profile]] = {}
+    for method in methods or METHODS[:1]:
+        if method == "soft":
+            profiles[method] = [soft_string(line, o, friction=friction, buckled=buckled) for o in wanted]
+        else:
+            profiles[method] = [stations(line, o, friction=friction) for o in wanted]
+    depths = np.linspace(0.02 * line.length, line.length, 50)
+    sticks = [
+        Broomstick(o.name, depths, hook_loads(line, replace(o), depths, friction=friction, buckled=buckled))
+        for o in wanted
+        if o.name in _TRIPS
+    ]
+    notes += _lock_up(line, [o.name for o in wanted], friction, buckled)
+    found = limits(line, next(iter(profiles.values()))[0].measured_depth)
+    return Study(scene.title, line, profiles, found, sticks, notes)
+
+
+def _lock_up(line: Line, names: list[str], friction: str, buckled: bool) -> list[str]:
+    """How far the string can be pushed, in words."""
+    notes = []
+    if "tripping-in" in names:
+        depth = lock_up_depth(line, OPERATIONS["tripping-in"], friction=friction, buckled=buckled)
+        if depth is not None:
+            notes.append(f"tripping in: the hook load is used up with the bit at {depth:.0f} m, from there it needs a push")
+    if "sliding" in names:
+        most = greatest_weight(line, OPERATIONS["sliding"], friction=friction, buckled=buckled)
+        notes.append(f"sliding: the string's own weight can put at most {most / 1e3:.1f} kN on the bit")
+    return notes
+
+
+def run(
+    scene: Scene,
+    out: Path,
+    operations: list[str] | None = None,
+    methods: list[str] | None = None,
+    weight_on_bit: str | None = None,
+    torque_on_bit: str | None = None,
+    friction: str = "dynamic",
+    buckled: bool = True,
+    console: Console | None = None,
+) -> Study:
+    """Compute, print the table, and write ``torque-drag.csv``, ``.nc``, ``.png`` and ``.json`` into ``out``."""
+    check_new_folder(out)
+    weight = _load(weight_on_bit, "N", "--weight-on-bit")
+    torque = _load(torque_on_bit, "N m", "--torque-on-bit")
+    found = study(scene, operations, methods, weight, torque, friction, buckled)
+    out.mkdir(parents=True, exist_ok=True)
+    print_table(found, console)
+    write_csv(found, out / "torque-drag.csv")
+    with replacing(out / "torque-drag.nc") as part:
+        dataset(found).to_netcdf(part, engine="h5netcdf")
+    draw(found, out / "torque-drag.png")
+    write_json(
+        out / "torque-drag.json",
+        {
+            "scene": scene.to_dict(),
+            "friction": friction,
+            "buckled": buckled,
+            "notes": found.notes,
+            "operations": [
+                {
+                    "method": p.method,
+                    "operation": p.operation.name,
+                    "weight_on_bit": p.operation.weight_on_bit,
+                    "torque_on_bit": p.operation.torque_on_bit,
+                    "hook_load": p.hook_load,
+                    "surface_torque": p.surface_torque,
+                    "largest_side_force": deepest(p, p.side_force)[0],
+                    "largest_side_force_at": deepest(p, p.side_force)[1],
+                    "buckling": buckling_text(p, found.limits),
+                }
+                for profiles in found.profiles.values()
+                for p in profiles
+            ],
+        },
+    )
+    for name in ("torque-drag.png", "torque-drag.csv", "torque-drag.nc"):
+        print(out / name)
+    return found
