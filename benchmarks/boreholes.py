@@ -454,8 +454,8 @@ depth, {near} mm at the nearest point; the distance grows with the square of the
 ## The wall
 
 `diameter` holds everywhere but where `[[hole.section]]` says otherwise: sections follow each other from the top,
-each to its measured depth `to`, with `diameter`, `friction_static`, `friction_dynamic`; the last one holds to the
-end. `caliper` is a log (file with measured depth and diameter, or rows in m) that replaces them where it reaches;
+each to its measured depth `to`, with `diameter`, `friction_static`, `friction_dynamic`; below the last one
+they are those of the scene. `caliper` is a log (file with measured depth and diameter, or rows in m) that replaces them where it reaches;
 `contact.friction_profile` (file with measured depth, `friction_static` and, if it differs, `friction_dynamic`; or
 rows) is friction as a field of depth. A step of the radius would be a wall across the hole: the radius is the
 greatest profile below the given one that changes by no more than {steepest} per metre. Nothing is wider than

@@ -281,6 +281,33 @@ def reproduce(
     compare(cases or [], out, docs, imitate, brief, stderr)
 
 
+@app.command("torque-drag")
+def torque_drag(
+    scene: SceneName,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="New folder for picture and numbers.")],
+    operation: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="rotating, tripping-out, tripping-in, drilling, sliding; may be repeated."),
+    ] = None,
+    method: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="soft, stations; may be repeated to compare.")
+    ] = None,
+    set_: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key.")] = None,
+    weight_on_bit: Annotated[str | None, typer.Option(metavar="LOAD", help="On bottom: '50 kN'.")] = None,
+    torque_on_bit: Annotated[str | None, typer.Option(metavar="TORQUE", help="Of the rock: '5 kN m'.")] = None,
+    friction: Annotated[str, typer.Option(metavar="dynamic|static", help="static: to break loose.")] = "dynamic",
+    buckled: Annotated[
+        bool, typer.Option("--buckled/--no-buckled", help="A string wound into a helix presses harder on the wall.")
+    ] = True,
+) -> None:
+    """Hook load, torque and side force along a hole, per operation (static torque and drag)."""
+    from drillfem.scene import load_scene
+    from drillfem.torque_drag.command import run as compute
+
+    loaded = load_scene(scene, _overrides(set_))
+    compute(loaded, out, operation, method, weight_on_bit, torque_on_bit, friction, buckled)
+
+
 @app.command("warm-up")
 def warm_up() -> None:
     """Compile all forms and kernels now, so that the first run starts at once."""

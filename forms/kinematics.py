@@ -16,11 +16,15 @@ E3 = ufl.as_vector((0.0, 0.0, 1.0))
 
 @dataclass(frozen=True)
 class Configuration:
-    """Where the rod is: centreline ``r`` (3, m), rotation ``R`` (3x3), material curvature ``u_m`` (3, 1/m)."""
+    """Where the rod is: centreline ``r`` (3, m), rotation ``R`` (3x3), material curvature ``u_m`` (3, 1/m).
+
+    ``p``: measured depth (m) of the hole's closest point, where that is an unknown of the rod.
+    """
 
     r: Expr
     R: Expr
     u_m: Expr
+    p: Expr | None = None
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,9 @@ Of the hole the forms know a quadratic piece about a point near the closest one,
 tangent t = dc/dp and t' = d2c/dp2 in the measured depth p. The closest point on it lies at d = (r - c).t/(t.t -
 t'.(r - c)) from c. Whoever evaluates the forms puts c at the closest point of the present r: then d = 0, the residual
 is that of the true hole, and its derivative by d is the consistent one.
+
+Where p is an unknown of the rod (the thesis' way, (D-6)), c is where the present p says, d = p - the depth of c, and
+:func:`closest_point` is the equation that ties p to r.
 """
 
 from __future__ import annotations
@@ -26,6 +29,8 @@ WALL = (
     "friction_dynamic",  # mu_d
     "pressure",  # multiplier of the augmented Lagrangian (N/m)
 )
+#: What follows where the measured depth is an unknown: the depth of the centre, m.
+DEPTH = len(WALL)
 
 
 @dataclass(frozen=True)
@@ -40,20 +45,31 @@ class Hole:
     def _vector(self, name: str) -> Expr:
         return ufl.as_vector([self[f"{name}{i}"] for i in (1, 2, 3)])
 
-    def advance(self, r: Expr) -> Expr:
-        """Measured depth d (m) from the stored centre to the closest point of r (3)."""
+    def advance(self, r: Expr, p: Expr | None = None) -> Expr:
+        """Measured depth d (m) from the stored centre to the closest point of r (3), or to p where that is unknown."""
+        if p is not None:
+            return p - self.field[DEPTH]
         away, t = r - self._vector("centre"), self._vector("tangent")
         return ufl.dot(away, t) / (ufl.dot(t, t) - ufl.dot(self._vector("second"), away))
 
-    def offset(self, r: Expr) -> Expr:
+    def offset(self, r: Expr, p: Expr | None = None) -> Expr:
         """r_r = r - r_p (3, m): from the closest point of the centreline (4-4)."""
-        d = self.advance(r)
+        d = self.advance(r, p)
         return r - self._vector("centre") - self._vector("tangent") * d - self._vector("second") * d**2 / 2
 
-    def tangent(self, r: Expr) -> Expr:
+    def direction(self, r: Expr, p: Expr | None = None) -> Expr:
+        """dr_p/dp (3) at the closest point."""
+        return self._vector("tangent") + self._vector("second") * self.advance(r, p)
+
+    def tangent(self, r: Expr, p: Expr | None = None) -> Expr:
         """Unit tangent (3) of the hole at the closest point."""
-        t = self._vector("tangent") + self._vector("second") * self.advance(r)
+        t = self.direction(r, p)
         return t / ufl.sqrt(ufl.dot(t, t))
+
+
+def closest_point(x: Configuration, test: Expr, hole: Hole) -> Expr:
+    """r_r . t_p tested (D-6): the equation of the measured depth p where it is an unknown."""
+    return ufl.dot(hole.offset(x.r, x.p), hole.direction(x.r, x.p)) * test
 
 
 @dataclass(frozen=True)
@@ -75,9 +91,9 @@ class Wall(Hole):
 
 def _contact(x: Configuration, radius: Expr, wall: Wall) -> tuple[Expr, Expr]:
     """Outward normal (3) and penetration (m, negative off the wall) of a string of this radius; no 0/0 on the axis."""
-    offset = wall.offset(x.r)
+    offset = wall.offset(x.r, x.p)
     distance = ufl.sqrt(ufl.dot(offset, offset) + 1e-24)
-    hole = wall["hole_radius"] + wall["radius_slope"] * wall.advance(x.r)
+    hole = wall["hole_radius"] + wall["radius_slope"] * wall.advance(x.r, x.p)
     return offset / distance, distance + radius - hole
 
 
@@ -121,7 +137,7 @@ def contact(x: Configuration, virtual: Twist, radius: Expr, wall: Wall) -> Expr:
     Where the hole narrows the force has a part along it: both come from the one potential.
     """
     normal, g = _contact(x, radius, wall)
-    away, t = wall.offset(x.r), wall._vector("tangent")
+    away, t = wall.offset(x.r, x.p), wall._vector("tangent")
     along = ufl.dot(t, virtual.v) / (ufl.dot(t, t) - ufl.dot(wall._vector("second"), away))
     return wall_pressure(g, wall) * (ufl.dot(normal, virtual.v) - wall["radius_slope"] * along)
 

@@ -139,6 +139,22 @@ def closest(table: Table, r: F8, p: F8) -> int:
 
 
 @kernel(lean=True)
+def piece(table: Table, r: F8, p: float, out: F8) -> float:
+    """Measured depth (m) of the closest point of r (3,), from the last one p, to round-off; p where it is lost.
+
+    out (9,): the hole at a point next to it, which the forms carry on from: centre, dr/dp, d2r/dp2.
+    """
+    new, found, c0, c1, c2, t0, t1, t2, k0, k1, k2 = _nearest(table.knots, table.coefficients, r[0], r[1], r[2], p)
+    if not found:
+        return p
+    out[0], out[1], out[2] = c0, c1, c2
+    out[3], out[4], out[5] = t0, t1, t2
+    out[6], out[7], out[8] = k0, k1, k2
+    # the search stops at a nanometre, which the law of the bit feels: the rest of the way is linear
+    return new + (r[0] - c0) * t0 + (r[1] - c1) * t1 + (r[2] - c2) * t2
+
+
+@kernel(lean=True)
 def project(u: F8, size: int, cells: I4, basis: F8, radius: F8, table: Table, p: F8, out: F8) -> Projection:
     """What the wall of a hole tells every quadrature point of a string.
 

@@ -294,8 +294,8 @@ def builtin_surveys() -> list[str]:
 
 def find(name_or_path: str, beside: Path | None = None) -> Path:
     """File of a built-in survey, or of a path, which is taken from the folder ``beside`` (that of the scene)."""
-    if name_or_path in builtin_surveys():
-        return folder() / f"{name_or_path}.csv"
+    if name_or_path.lower() in builtin_surveys():
+        return folder() / f"{name_or_path.lower()}.csv"
     return (beside or Path()) / name_or_path
 
 
@@ -306,10 +306,12 @@ def with_files(data: Mapping[str, Any], beside: Path | None = None) -> dict[str,
     friction profile without a dynamic coefficient takes the ratio of those of [contact]. Raises SceneError.
     """
     made = dict(data)
-    contact = data.get("contact")
-    mu = [contact.get(f"friction_{kind}") for kind in ("dynamic", "static")] if isinstance(contact, Mapping) else []
-    known = len(mu) == 2 and all(isinstance(x, int | float) for x in mu) and mu[1] > 0
-    ratio = min(1.0, mu[0] / mu[1]) if known else 1.0
+    given = data.get("contact")
+    contact: Mapping[str, Any] = given if isinstance(given, Mapping) else {}
+    static, dynamic = contact.get("friction_static"), contact.get("friction_dynamic")
+    ratio = 1.0
+    if isinstance(static, int | float) and isinstance(dynamic, int | float) and static > 0:
+        ratio = min(1.0, dynamic / static)
     for table, name, read in (
         ("hole", "survey", read_survey),
         ("hole", "caliper", read_caliper),

@@ -54,11 +54,12 @@ def limited(at: F8, value: F8, slope: float = STEEPEST) -> tuple[F8, F8]:
 def radius_profile(length: float, diameter: float, sections: Rows = (), caliper: Rows = ()) -> tuple[F8, F8]:
     """Depths (n,) and radii (n,) in m of a hole of ``length`` m.
 
-    sections: rows (measured depth of the lower end, diameter or None for ``diameter``) from the top down; the last one
-    holds to the end. caliper: rows (measured depth, diameter), in the place of the sections where it reaches. Changes
-    are no steeper than `STEEPEST`.
+    sections: rows (measured depth of the lower end, diameter or None for ``diameter``) from the top down; below the
+    last one it is ``diameter``. caliper: rows (measured depth, diameter), in the place of the sections where it
+    reaches. Changes are no steeper than `STEEPEST`.
     """
-    rows = [(float(row[0] or 0.0), float(row[1] or diameter)) for row in sections] or [(length, diameter)]
+    rows = [(float(row[0] or 0.0), float(row[1] or diameter)) for row in sections]
+    rows.append((max(length, *(end for end, _ in rows[-1:]), 1.0), diameter))
     at, d = stairs(length, [end for end, _ in rows], [[wide] for _, wide in rows])
     value = d[:, 0] / 2
     if len(caliper):
@@ -80,15 +81,16 @@ def friction_profile(
     """Depths (n,; m) and static and dynamic coefficients (n, 2) along a hole of ``length`` m.
 
     sections: rows (measured depth of the lower end, mu_s, mu_d; None for ``static``, ``dynamic``) from the top down;
-    the last one holds to the end. profile: rows (measured depth, mu_s, mu_d), in the place of the sections, linear
-    between.
+    below the last one they are ``static``, ``dynamic``. profile: rows (measured depth, mu_s, mu_d), in the place of
+    the sections, linear between.
     """
     if len(profile):
         rows = np.asarray(profile, dtype=np.float64)
         if len(rows) == 1:
             rows = np.vstack([rows, rows + [1.0, 0.0, 0.0]])
         return np.ascontiguousarray(rows[:, 0]), np.ascontiguousarray(rows[:, 1:])
-    given = [(float(end or 0.0), s, d) for end, s, d in sections] or [(length, None, None)]
+    given = [(float(end or 0.0), s, d) for end, s, d in sections]
+    given.append((max(length, *(end for end, _, _ in given[-1:]), 1.0), None, None))
     values = [[static if s is None else float(s), dynamic if d is None else float(d)] for _, s, d in given]
     at, value = stairs(length, [end for end, _, _ in given], values)
     at[1:-1] += STEP / 2 * np.where(np.arange(len(at) - 2) % 2, 1.0, -1.0)

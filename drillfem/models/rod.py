@@ -13,7 +13,7 @@ import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..boreholes.closest import closest
+from ..boreholes.closest import piece
 from ..compat import (
     Array,
     MatrixForm,
@@ -142,19 +142,22 @@ class Rod:
         self._u, self._u_dot = self.u.x.array, self.u_dot.x.array
         s = self.V.tabulate_dof_coordinates()[:, 0]
         self.nodes = np.argsort(s)
+        self._last = int(self.nodes[-1])
         self.arc_length: Array = s[self.nodes]
         self.length = float(sum(section.length for section in scene.string))
         self.on = measures(self.string, scene.mesh.degree, scene.mesh.quadrature == "reduced")
         self.section = Section(section_field(scene, self.string))
         self.s = ufl.SpatialCoordinate(self.mesh)[0]
         self.weight, self.torque = self.constant(0.0), self.constant(0.0)
+        self._weight_value, self._torque_value = self.weight.value, self.torque.value
         #: load of the rock on the bit: weight (N), torque (N m); change it by :meth:`set_bit_load`
         self.bit_load: Array = np.zeros(2)
         self.wall = self._wall()
         #: piece of the hole's centreline at the bit, where the hole bends; unit tangent of the hole there (3,)
         self.bit_hole = self.constant(np.zeros(9))
-        self.bit_hole.value[3:6] = 0.0, 0.0, 1.0
-        self.bit_tangent: Array = np.array([0.0, 0.0, 1.0])
+        self._bit_piece: Array = self.bit_hole.value
+        self.bit_tangent: Array = self._bit_piece[3:6]
+        self.bit_tangent[:] = 0.0, 0.0, 1.0
         self.bit_measured_depth = self.length
         self.tip_force = self.constant(scene.ends.tip_force)
         self.tip_moment = self.constant(scene.ends.tip_moment)
@@ -236,12 +239,12 @@ class Rod:
         """Degree of the rule that integrates contact."""
         return 2 * self.scene.mesh.degree
 
-    @property
+    @cached_property
     def bends(self) -> bool:
         """Whether the string lies in a hole that leaves the axis e3."""
         return self.wall is not None and self.scene.hole.bends
 
-    @property
+    @cached_property
     def has_bit(self) -> bool:
         """Whether rock loads the lower end."""
         return self.scene.drills
@@ -290,7 +293,7 @@ class Rod:
         at = self.bit
         if not self.bends:
             return float(u[at.depth]), float(u[at.speed]), float(u[at.spin])
-        first = self.dof(-1, "v1")
+        first = at.speed - 2
         return self.bit_measured_depth, float(u[first : first + 3] @ self.bit_tangent), float(u[at.spin])
 
     @cached_property
@@ -339,22 +342,20 @@ class Rod:
         if self.wall is None:
             return
         self.wall.update(u, size)
-        if not self.bends:
+        self.find_bit(u, size)
+
+    def find_bit(self, u: Array, size: int = 0) -> None:
+        """Closest point of the hole to the lower end alone, see :meth:`find_hole`."""
+        if self.wall is None or not self.bends:
             return
-        hole, at = self.wall.hole, int(self.nodes[-1]) * (size or self.ansatz.size)
-        p = np.array([self.bit_measured_depth])
-        closest(hole.table, u[None, at : at + 3], p)
-        frame = hole.frame(p[0])
-        # the law feels a nanometre, at which the search stops: the rest of the way is linear
-        self.bit_measured_depth = float(p[0] + frame.tangent[0] @ (u[at : at + 3] - frame.position[0]))
-        self.bit_hole.value[:] = np.concatenate([frame.position[0], frame.tangent[0], frame.curvature[0]])
-        self.bit_tangent[:] = frame.tangent[0]
+        at = self._last * (size or self.ansatz.size)
+        here = u[at : at + 3]
+        self.bit_measured_depth = piece(self.wall.hole.table, here, self.bit_measured_depth, self._bit_piece)
 
     def set_bit_load(self, weight: float, torque: float) -> None:
         """Load of the rock on the bit: ``weight`` (N, up), ``torque`` (N m, against the drilling direction)."""
-        self.bit_load[:] = weight, torque
-        self.weight.value = weight
-        self.torque.value = torque
+        self.bit_load[0], self.bit_load[1] = weight, torque
+        self._weight_value[...], self._torque_value[...] = weight, torque
 
     def residual(self, t: float, u: Array, u_dot: Array, out: Array) -> None:
         """F(t, u, u-dot), shape (dofs,); end conditions replace the momentum rows of their dofs."""

@@ -98,10 +98,14 @@ class Line:
         length[0] = float(self.pieces.length[: first + 1].sum()) - gone
         return replace(self, pieces=kept._replace(length=length))
 
+    def piece(self, s: F8) -> NDArray[np.int64]:
+        """Section (n,) of arc lengths s (n,); the one above where two meet."""
+        return np.clip(np.searchsorted(self.joints, s * (1 - 1e-13)) - 1, 0, len(self.pieces.length) - 1)
+
     def at(self, s: F8) -> Stretch:
         """What the string finds at arc lengths s (n,); of the section above where two meet."""
         frame, table, pieces = self.hole.frame(s), self.hole.table, self.pieces
-        i = np.clip(np.searchsorted(self.joints, s * (1 - 1e-13)) - 1, 0, len(pieces.length) - 1)
+        i = self.piece(s)
         t = frame.tangent / np.linalg.norm(frame.tangent, axis=1)[:, None]
         weight = pieces.weight[i][:, None] * np.array(self.down)
         along = np.einsum("ij,ij->i", weight, t)
@@ -121,7 +125,7 @@ class Line:
         joints = self.joints
         deep = self.hole.frame(joints).position @ np.array(self.down)
         carried = np.concatenate([np.cumsum((self.pieces.weight * np.diff(deep))[::-1])[::-1], [0.0]]) + self.below
-        i = np.clip(np.searchsorted(joints, s * (1 - 1e-13)) - 1, 0, len(self.pieces.length) - 1)
+        i = self.piece(s)
         here = self.hole.frame(s).position @ np.array(self.down)
         return carried[i + 1] + self.pieces.weight[i] * (deep[i + 1] - here)
 
@@ -199,10 +203,20 @@ def wall_friction(scene: Scene) -> WallFriction:
     def arm(s: F8) -> F8:
         return line.at(s).radius if reading.friction_argument == "contact-speed" else np.ones_like(s)
 
+    viscosity = scene.mud.viscosity if scene.mud is not None else 0.0
+
+    def drag(s: F8) -> F8:
+        # laminar flow between concentric cylinders, the inner one turning (Couette)
+        here = line.at(s)
+        outer = here.radius + here.clearance
+        inner = np.array([x.outer_radius for x in scene.string])[line.piece(s)]
+        return 4 * np.pi * viscosity / (1 / inner**2 - 1 / outer**2)
+
     return WallFriction(
         torque,
         arm,
         line.breaks,
+        drag if viscosity else np.zeros_like,
         law=reading.law,
         velocity_scale=contact.friction_velocity_scale,
         regularisation=contact.friction_regularisation,

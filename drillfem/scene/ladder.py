@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,6 +20,7 @@ from drillfem.scene.numbers import SPRING
 from drillfem.scene.tables import GIVES, Initial, Mesh, Output, Time
 
 if TYPE_CHECKING:
+    from drillfem.boreholes import Frame
     from drillfem.scene.scene import Scene
     from drillfem.stability.transfer import Waves
 
@@ -132,76 +132,55 @@ def giver(name: str) -> str:
 
 # -- the hole ---------------------------------------------------------------------------------------------
 class Bend(NamedTuple):
-    """Where a hole bends most: curvature in 1/m, arc length in m (nan: unknown), whole turn of its axis in rad."""
+    """Where a hole bends most: curvature in 1/m, measured depth in m (nan: everywhere), whole turn in rad."""
 
     curvature: float
     at: float
     turn: float
 
 
-def bend_of(hole: Any, length: float) -> Bend | None:
-    """The sharpest bend of a hole along a string of ``length`` (m); None for a hole that is straight.
-
-    What a hole calls itself does not count, its geometry does. ``hole`` may have ``curvature`` (1/m, a number or a
-    function of arc length), ``dogleg_severity`` (rad/m), ``radius`` (m), or ``stations``: rows of measured depth (m),
-    inclination and azimuth (rad), between which the bend is that of minimum curvature. A hole of another kind than
-    "none" or "straight" that has none of them is taken as bent, by an unknown amount (nan).
-    """
-    given = getattr(hole, "curvature", None)
-    if callable(given):
-        s = np.linspace(0.0, length, 2001)
-        kappa = np.array([abs(float(given(x))) for x in s])
-        found = Bend(float(kappa.max()), float(s[kappa.argmax()]), float((kappa[1:] + kappa[:-1]).sum() * s[1] / 2))
-    elif (stations := getattr(hole, "stations", None)) is not None:
-        bends = [Bend(0.0, math.nan, 0.0)]
-        for (a, inc_a, azi_a), (b, inc_b, azi_b) in pairwise(stations):
-            # dogleg as twice an arcsine: an arccosine would lose small ones to rounding
-            half = math.sin((inc_b - inc_a) / 2) ** 2
-            half += math.sin(inc_a) * math.sin(inc_b) * math.sin((azi_b - azi_a) / 2) ** 2
-            dogleg = 2 * math.asin(min(1.0, math.sqrt(half)))
-            bends.append(Bend(dogleg / (b - a), (a + b) / 2, dogleg))
-        sharpest = max(bends)
-        found = Bend(sharpest.curvature, sharpest.at, math.fsum(b.turn for b in bends))
-    else:
-        radius = getattr(hole, "radius", None)
-        kappa_one = abs(given or getattr(hole, "dogleg_severity", None) or (1 / radius if radius else 0.0))
-        found = Bend(kappa_one, math.nan, math.nan)
-        if not kappa_one and getattr(hole, "kind", "none") not in ("none", "straight"):
-            return Bend(math.nan, math.nan, math.nan)
-    return found if found.curvature > 1e-12 else None
+def along(scene: Scene) -> tuple[F8, Frame] | None:
+    """Measured depths (m,) along the string and the hole there; None for a hole along e3, or none."""
+    if not scene.hole.bends or scene.borehole is None:
+        return None
+    at = np.linspace(0.0, scene.length, 4001)
+    return at, scene.borehole.frame(at)
 
 
-def inclination_of(hole: Any, length: float) -> float:
-    """Greatest inclination (rad) of a hole along a string of ``length`` (m).
+def bend_of(scene: Scene) -> Bend | None:
+    """The sharpest bend of the hole along the string; None for a straight one. What it calls itself does not count."""
+    found = along(scene)
+    if found is None:
+        return None
+    at, kappa = found[0], found[1].dogleg_severity
+    if kappa.max() < 1e-12:
+        return None
+    return Bend(float(kappa.max()), float(at[kappa.argmax()]), float((kappa[1:] + kappa[:-1]).sum() * at[1] / 2))
 
-    From its ``inclination``, a number or a function of arc length, or its ``stations``; 0 if it has neither.
-    """
-    given = getattr(hole, "inclination", None)
-    if callable(given):
-        return max(abs(float(given(s))) for s in np.linspace(0.0, length, 2001))
-    stations = getattr(hole, "stations", None) or ((0.0, given or 0.0, 0.0),)
-    return float(max(abs(inclination) for _, inclination, _ in stations))
+
+def inclination_of(scene: Scene) -> float:
+    """Greatest inclination (rad) of the hole along the string."""
+    found = along(scene)
+    return 0.0 if found is None else float(found[1].inclination.max())
 
 
 def _bend_text(scene: Scene) -> str:
     """How the hole leaves the axis e3; empty for a straight one along it."""
-    bend, inclination = bend_of(scene.hole, scene.length), inclination_of(scene.hole, scene.length)
+    bend, inclination = bend_of(scene), inclination_of(scene)
     kind = f"hole.kind = {scene.hole.kind!r}"
     if bend is None:
         return f"the hole is inclined by {math.degrees(inclination):.3g} deg ({kind})" if inclination > 1e-12 else ""
-    if math.isnan(bend.curvature):
-        return f"the hole is bent ({kind})"
     return f"the hole bends by {math.degrees(bend.curvature) * 30:.3g} deg per 30 m ({kind})"
 
 
-def hole_rule(scene: Scene, hole: Any = None) -> Finding:
+def hole_rule(scene: Scene) -> Finding:
     """Shape of the hole and of the unstressed string: a bend needs a rung that bends.
 
     What it costs the string: moment EI kappa, stress E kappa r, and in a hole the wall's side force N kappa, whose
-    friction takes the torque mu r |N| times the turn (capstan). ``hole`` stands in for that of the scene.
+    friction takes the torque mu r |N| times the turn (capstan).
     """
     source = "capstan and beam theory; minimum curvature between survey stations"
-    bend, where = bend_of(hole if hole is not None else scene.hole, scene.length), "the hole"
+    bend, where = bend_of(scene), "the hole"
     if scene.reference.shape == "arc" and scene.reference.radius:
         bend, where = Bend(1 / scene.reference.radius, math.nan, scene.length / scene.reference.radius), "the string"
     if bend is None:
@@ -209,8 +188,6 @@ def hole_rule(scene: Scene, hole: Any = None) -> Finding:
         return Finding("hole", "lumped", f"straight: {what}", {"curvature": 0.0}, source)
     # a straight rung would leave all of it out
     numbers = {"curvature": bend.curvature}
-    if math.isnan(bend.curvature):
-        return Finding("hole", "spatial", f"{where} is bent, by how much it does not say", numbers, source, 1.0)
     stiff = [s.section_stiffness() for s in scene.string]
     moment = max(k.bending1 for k in stiff) * bend.curvature
     numbers |= {"dogleg_severity": math.degrees(bend.curvature) * 30, "bending_moment": moment}
@@ -243,7 +220,7 @@ def hole_rule(scene: Scene, hole: Any = None) -> Finding:
 def side_load_rule(scene: Scene) -> Finding:
     """Gravity, tip loads and motions across the string bend it; a straight rung has no room for them."""
     source = "balance of forces across the string (2-51), (2-61)"
-    g, hole = scene.gravity, inclination_of(scene.hole, scene.length)
+    g, hole = scene.gravity, inclination_of(scene)
     numbers: dict[str, float] = {}
     why = []
     sine = max(math.hypot(*g.direction[:2]), math.sin(hole))
@@ -284,7 +261,9 @@ def tension(scene: Scene) -> tuple[F8, F8] | None:
     """
     ends, down = scene.ends, scene.gravity.magnitude * scene.gravity.direction[2]
     at = np.array(scene.interfaces)
-    weight = down * np.array([s.mass_per_length * s.length for s in scene.string])
+    # in a hole that bends, what hangs is the depth gained
+    gained = np.diff(at) if along(scene) is None else np.diff(scene.borehole.frame(at).position[:, 2])  # type: ignore[union-attr]
+    weight = down * np.array([s.mass_per_length for s in scene.string]) * gained
     below = np.append(weight[::-1].cumsum()[::-1], 0.0)  # weight of the string below each interface
     held = ends.top in ("clamped", "pinned", "hung", "driven")
     if scene.drills:

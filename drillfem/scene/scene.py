@@ -189,6 +189,8 @@ class Scene:
         yield from self._string_problems()
         yield from self._end_problems()
         yield from self._drilling_problems()
+        if self.hole.bends or self.hole.caliper or self.hole.section:
+            _ = self.borehole  # complains itself
         yield from self._numerics_problems()
         if self.model != "auto" and (why := self.obstacle(self.model)):
             able = [m for m in MODELS if not self.obstacle(m)]
@@ -431,9 +433,24 @@ def load_scene(name_or_path: str | Path, overrides: Mapping[str, Any] | None = N
         data = _parse(path)
         for dotted, value in (overrides or {}).items():
             _override(data, dotted, value)
+        data = _with_files(data, path.parent)
         return Scene.from_dict({"name": path.stem, **data})
     except SceneError as error:
         raise SceneError(" ".join(f"scene {text or repr(text)}: {error}".split())) from None
+
+
+#: keys whose rows may stand in a file
+_FILES = (("hole", "survey"), ("hole", "caliper"), ("contact", "friction_profile"))
+
+
+def _with_files(data: dict[str, Any], beside: Path) -> dict[str, Any]:
+    """The data with the tables that it names as files (survey, caliper, friction) in their place."""
+    named = [data[table].get(name) for table, name in _FILES if isinstance(data.get(table), dict)]
+    if not any(isinstance(value, str) for value in named):
+        return data
+    from drillfem.boreholes.files import with_files
+
+    return with_files(data, beside)
 
 
 def _exists(path: Path) -> bool:

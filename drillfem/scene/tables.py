@@ -40,9 +40,12 @@ def is_unit(v: Vector) -> bool:
 
 @dataclass(frozen=True)
 class HoleSection:
-    """A stretch of the hole's wall: casing, or open hole; sections follow each other from the top down."""
+    """A stretch of the hole's wall, such as casing; sections follow each other from the top down.
 
-    to: float = key("measured depth of its lower end (the last one holds to the end of the hole)", "m", POSITIVE)
+    Below the last one the hole is as [hole] and [contact] say.
+    """
+
+    to: float = key("measured depth of its lower end", "m", POSITIVE)
     diameter: float | None = key("diameter", "m", POSITIVE, default=None, default_text="hole.diameter")
     friction_static: float | None = key(
         "mu_s on this stretch", "1", NOT_NEGATIVE, default=None, default_text="contact.friction_static"
@@ -69,7 +72,7 @@ _SHAPES = {
     "radius": ("arc", "build", "helix"),
     "kick_off": ("build",),
     "final_inclination": ("build",),
-    "transition": ("build",),
+    "transition": ("build", "survey"),
     "pitch": ("helix",),
     "points": ("spline",),
     "survey": ("survey",),
@@ -111,7 +114,7 @@ class Hole:
         default_text="see kind",
     )
     transition: float = key(
-        "length of hole over which the curvature of a 'build' rises and falls; 0: it jumps",
+        "length of hole over which the curvature rises and falls; 0: in a 'build' it jumps, in a 'survey' it is 5 m",
         "m",
         NOT_NEGATIVE,
         default=0.0,

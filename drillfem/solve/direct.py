@@ -46,6 +46,7 @@ class DirectRun:
         self.bit_angle = 0.0
         self.steps = 0
         self.depth_start = 0.0
+        self._motion = (0.0, 0.0, 0.0)
         self.depth_start = self._bit_motion(u0)[0] if rod.turns else 0.0
         self._mark_bit(u0)
         self._first_row(u0)
@@ -54,7 +55,7 @@ class DirectRun:
 
     def _bit_motion(self, u: Array) -> tuple[float, float, float]:
         """Depth drilled (m), axial speed (m/s) and spin (rad/s) of the lower end in a state."""
-        self.rod.find_hole(u)
+        self.rod.find_bit(u)
         depth, speed, spin = self.rod.end_motion(u)
         return depth - self.depth_start, speed, spin
 
@@ -62,6 +63,7 @@ class DirectRun:
         if not self.rod.turns:
             return
         at = self.rod.bit
+        self._motion = self._bit_motion(u)
         rotation = u[at.rotation]
         self.rotation = rotation.copy() if isinstance(at.rotation, slice) else float(rotation)
         self.stepper.newton.start_rotation = self.rotation
@@ -100,17 +102,17 @@ class DirectRun:
     def step(self, until: float) -> float:
         """One accepted step; moves the rock, books the energy. Returns the time."""
         rod = self.rod
-        before = self._bit_motion(self.stepper.u)[1] if self.rock is not None else 0.0
+        before = self._motion[1]
         report = self.stepper.step(until)
         self.audit.add(report.stage_time, self._powers(report.stage_time))
         if rod.turns:
             u = self.stepper.u
             turn = turn_between(self.rotation, u[rod.bit.rotation])
             self.bit_angle += turn
-            if self.rock is not None:
-                depth, speed, spin = self._bit_motion(u)
-                self.rock.commit(turn, depth, report.step, before, speed, spin)
             self._mark_bit(u)
+            if self.rock is not None:
+                depth, speed, spin = self._motion
+                self.rock.commit(turn, depth, report.step, before, speed, spin)
         self.steps += 1
         return report.time
 

@@ -81,7 +81,10 @@ _KNOWN = {"sqrt", "sin", "cos", "exp", "fabs", "fmax", "fmin", "pow"}
 _INDENT, _TARGET = r"(\s*)", r"(\w+(?:\[[^=]*\])?)"
 #: Lines that are rewritten (a condition, a choice, an array, a number, an assignment), and lines that stay.
 _RULES = [
-    (re.compile(rf"{_INDENT}bool (\w+) = ([^<>=!&|?]+) ([<>]=?|[=!]=) ([^<>=!&|?]+);"), r"\1mask \2 = VEC(\3) \4 VEC(\5);"),
+    (
+        re.compile(rf"{_INDENT}bool (\w+) = ([^<>=!&|?]+) ([<>]=?|[=!]=) ([^<>=!&|?]+);"),
+        r"\1mask \2 = VEC(\3) \4 VEC(\5);",
+    ),
     (re.compile(rf"{_INDENT}double (\w+) = (\w+) \? ([^?:]+) : ([^?:]+);"), r"\1vec \2 = pick(\3, VEC(\4), VEC(\5));"),
     (re.compile(rf"{_INDENT}double (\w+\[\d+\]) = \{{0\}};"), r"\1vec \2 = {0};"),
     (re.compile(rf"{_INDENT}double (\w+) = ([^<>=!&|?:]+);"), r"\1vec \2 = VEC(\3);"),

@@ -72,6 +72,7 @@ struct solver {
     const int32_t *local;    /* (n, d + 1): its nodes, as the kernel counts them: top, bottom, inner ones */
     const int32_t *node;     /* (n, d + 1): the same, as the unknowns count them */
     const uint8_t *held;     /* (dofs): rows that are replaced */
+    int32_t check;           /* whether to make sure that the kinematic rows are those of their nodes */
     int32_t n_extra;         /* entries to add besides the form, each within the block of a vertex of element `of` */
     const int32_t *extra;    /* (n_extra, 3): e, row and column in its element matrix */
     const double *extra_value;
@@ -215,7 +216,7 @@ INLINE void add_matrix_product(int m, int k, int n, double sign, const double *r
 }
 
 /* A (n, n) becomes its inverse, by Gauss-Jordan elimination with row pivots; numbers that are none where it has none */
-static void invert(int n, double *A)
+INLINE void invert(const int n, double *A)
 {
     int row[n];
     for (int k = 0; k < n; k++) {
@@ -253,84 +254,96 @@ static void invert(int n, double *A)
 
 /* ---- factorisation ---------------------------------------------------------------------------------------------- */
 
-/* Element matrix of element e by rows of v (local order): K (nr, nr) and X (nr, nxe); adds to P and D of its nodes what
-   will be their J_xx and J_xv. Returns the largest entry that couples x-rows to other nodes, relative to their own. */
-static double split(const struct solver *s, int e, const double *A, double *K, double *X)
+/* Element matrix A (N, N, by rows) of element e: its rows of v in local order, K (nr, nr) and X (nr, nxe); P and D of its
+   nodes gather what will be their J_xx and J_xv. */
+INLINE void split(const struct solver *s, int e, const double *restrict A, double *restrict K, double *restrict X,
+                  const int nx, const int nv, const int d)
 {
-    const int nx = s->nx, nv = s->nv, size = nx + nv, nn = s->d + 1, N = nn * size, nr = nn * nv;
+    const int size = nx + nv, nn = d + 1, N = nn * size, nr = nn * nv;
     const int32_t *local = s->local + e * nn, *node = s->node + e * nn;
-    double own = 0.0, other = 0.0;
     for (int a = 0; a < nn; a++) {
-        const double *rows = A + local[a] * size * N;
-        for (int i = 0; i < nx; i++)
-            for (int b = 0; b < nn; b++)
-                for (int j = 0; j < size; j++) {
-                    const double value = rows[i * N + local[b] * size + j], much = fabs(value);
-                    if (a != b) {
-                        other = much > other ? much : other;
-                        continue;
-                    }
-                    own = much > own ? much : own;
-                    if (j < nx)
-                        s->P[(node[a] * nx + j) * nx + i] += value;
-                    else
-                        s->D[(node[a] * nv + j - nx) * nx + i] -= value;
-                }
-        for (int i = 0; i < nv; i++) {
-            const int r = a * nv + i;
-            if (s->held[node[a] * size + nx + i]) {
-                for (int b = 0; b < nn; b++) {
-                    for (int j = 0; j < nx; j++)
-                        X[(b * nx + j) * nr + r] = 0.0;
-                    for (int j = 0; j < nv; j++)
-                        K[(b * nv + j) * nr + r] = 0.0;
-                }
-                K[r * nr + r] = 1.0;
-                continue;
-            }
-            for (int b = 0; b < nn; b++) {
-                const double *from = rows + (nx + i) * N + local[b] * size;
-                for (int j = 0; j < nx; j++)
-                    X[(b * nx + j) * nr + r] = from[j];
-                for (int j = 0; j < nv; j++)
-                    K[(b * nv + j) * nr + r] = from[nx + j];
-            }
+        const double *rows = A + local[a] * size * N, *own = rows + local[a] * size;
+        double *P = s->P + node[a] * nx * nx, *D = s->D + node[a] * nv * nx;
+        for (int i = 0; i < nx; i++) {
+            for (int j = 0; j < nx; j++)
+                P[j * nx + i] += own[i * N + j];
+            for (int j = 0; j < nv; j++)
+                D[j * nx + i] -= own[i * N + nx + j];
+        }
+        for (int b = 0; b < nn; b++) {
+            const double *block = rows + nx * N + local[b] * size;
+            double *to_X = X + b * nx * nr + a * nv, *to_K = K + b * nv * nr + a * nv;
+            for (int j = 0; j < nx; j++)
+                for (int i = 0; i < nv; i++)
+                    to_X[j * nr + i] = block[i * N + j];
+            for (int j = 0; j < nv; j++)
+                for (int i = 0; i < nv; i++)
+                    to_K[j * nr + i] = block[i * N + nx + j];
         }
     }
+    for (int a = 0; a < 2; a++)
+        for (int i = 0; i < nv; i++)
+            if (s->held[node[a] * size + nx + i]) {
+                const int r = a * nv + i;
+                for (int j = 0; j < nn * nx; j++)
+                    X[j * nr + r] = 0.0;
+                for (int j = 0; j < nr; j++)
+                    K[j * nr + r] = j == r ? 1.0 : 0.0;
+            }
+}
+
+/* Largest entry of A that couples x of a node to other nodes, relative to those within nodes */
+static double reach(const double *A, int nx, int nv, int d)
+{
+    const int size = nx + nv, N = (d + 1) * size;
+    double own = 0.0, other = 0.0;
+    for (int r = 0; r < N; r++)
+        for (int c = 0; r % size < nx && c < N; c++) {
+            const double much = fabs(A[r * N + c]);
+            if (r / size == c / size)
+                own = much > own ? much : own;
+            else
+                other = much > other ? much : other;
+        }
     return own > 0.0 ? other / own : other;
 }
 
-/* Returns 0, or 1 where the kinematic rows reach beyond their nodes, so that this elimination does not apply. */
-int factorise(const struct solver *s, const struct form *f)
+INLINE int factorise_sized(const struct solver *s, const struct form *f, const int nx, const int nv, const int d)
 {
-    const int n = s->n, nx = s->nx, nv = s->nv, size = nx + nv, nn = s->d + 1;
-    const int N = nn * size, nr = nn * nv, nxe = nn * nx, ne = 2 * nv, ni = nr - ne, nodes = n * s->d + 1;
-    double A[N * N], X[nr * nxe], inner[nr * ni + 1];
-    double reach = 0.0;
+    const int n = s->n, size = nx + nv, nn = d + 1, N = nn * size, nr = nn * nv, nxe = nn * nx, ne = 2 * nv;
+    const int ni = nr - ne, nodes = n * d + 1;
+    double A[LANES][N * N], X[nr * nxe], inner[ne * ni + 1];
     gather_constants(f);
     memset(s->P, 0, sizeof(double) * nodes * nx * nx);
     memset(s->D, 0, sizeof(double) * nodes * nv * nx);
     memset(s->S, 0, sizeof(double) * (n + 1) * nv * nv);
     for (int cell = 0; cell < f->cells; cell += LANES) {
         const int count = f->lanes ? run_lanes(f, cell) : f->cells - cell < LANES ? f->cells - cell : LANES;
+        if (f->lanes)
+            for (int k = 0; k < N * N; k++)
+                for (int l = 0; l < LANES; l++)
+                    A[l][k] = f->A_lanes[k * LANES + l];
+        else
+            memset(A, 0, sizeof A);
         for (int l = 0; l < count; l++) {
             const int e = s->element[cell + l];
-            for (int k = 0; k < N * N; k++)
-                A[k] = f->lanes ? f->A_lanes[k * LANES + l] : 0.0;
-            run(f, cell + l, A);
+            run(f, cell + l, A[l]);
             for (int k = 0; k < s->n_extra; k++)
                 if (s->extra[3 * k] == e)
-                    A[s->extra[3 * k + 1] * N + s->extra[3 * k + 2]] += s->extra_value[k];
-            const double beyond = split(s, e, A, s->K + (int64_t)e * nr * nr, s->B + (int64_t)e * nr * nxe);
-            reach = beyond > reach ? beyond : reach;
+                    A[l][s->extra[3 * k + 1] * N + s->extra[3 * k + 2]] += s->extra_value[k];
+            if (s->check && reach(A[l], nx, nv, d) > 1e-9)
+                return 1;
+            split(s, e, A[l], s->K + (int64_t)e * nr * nr, s->B + (int64_t)e * nr * nxe, nx, nv, d);
         }
     }
     for (int k = 0; k < nodes; k++) {
-        double D[nx * nv];
+        double old[nx * nv], *D = s->D + k * nv * nx;
         invert(nx, s->P + k * nx * nx);
-        memcpy(D, s->D + k * nv * nx, sizeof D);
-        memset(s->D + k * nv * nx, 0, sizeof D);
-        add_matrix_product(nx, nx, nv, 1.0, s->P + k * nx * nx, D, s->D + k * nv * nx);
+        for (int i = 0; i < nx * nv; i++) {
+            old[i] = D[i];
+            D[i] = 0.0;
+        }
+        add_matrix_product(nx, nx, nv, 1.0, s->P + k * nx * nx, old, D);
     }
     for (int e = 0; e < n; e++) {
         const int32_t *node = s->node + e * nn;
@@ -367,8 +380,7 @@ int factorise(const struct solver *s, const struct form *f)
     }
     /* S becomes the inverse of its pivot block, L = L S^-1 */
     for (int e = 0; e <= n; e++) {
-        double *S = s->S + (int64_t)e * nv * nv, *L = s->L + (int64_t)e * nv * nv;
-        double old[nv * nv];
+        double *S = s->S + (int64_t)e * nv * nv, *L = s->L + (int64_t)e * nv * nv, old[nv * nv];
         invert(nv, S);
         if (e == n)
             break;
@@ -377,7 +389,25 @@ int factorise(const struct solver *s, const struct form *f)
         add_matrix_product(nv, nv, nv, 1.0, old, S, L);
         add_matrix_product(nv, nv, nv, -1.0, L, s->U + (int64_t)e * nv * nv, S + nv * nv);
     }
-    return reach > 1e-9;
+    return 0;
+}
+
+/* Loops of known length are several times as fast. */
+#define DISPATCH(sized, ...)                    \
+    if (s->nx == 7 && s->nv == 6 && s->d == 3)  \
+        return sized(__VA_ARGS__, 7, 6, 3);     \
+    if (s->nx == 7 && s->nv == 6 && s->d == 2)  \
+        return sized(__VA_ARGS__, 7, 6, 2);     \
+    if (s->nx == 3 && s->nv == 3 && s->d == 3)  \
+        return sized(__VA_ARGS__, 3, 3, 3);     \
+    if (s->nx == 2 && s->nv == 2 && s->d == 3)  \
+        return sized(__VA_ARGS__, 2, 2, 3);     \
+    return sized(__VA_ARGS__, s->nx, s->nv, s->d);
+
+/* Returns 0, or 1 where the kinematic rows reach beyond their nodes, so that this elimination does not apply. */
+int factorise(const struct solver *s, const struct form *f)
+{
+    DISPATCH(factorise_sized, s, f)
 }
 
 /* ---- solution --------------------------------------------------------------------------------------------------- */
@@ -442,17 +472,7 @@ INLINE void solve_sized(const struct solver *s, const double *restrict b, double
 /* y = J^-1 b; y may not be b */
 void solve(const struct solver *s, const double *b, double *y)
 {
-    /* loops of known length are several times as fast */
-    if (s->nx == 7 && s->nv == 6 && s->d == 3)
-        solve_sized(s, b, y, 7, 6, 3);
-    else if (s->nx == 7 && s->nv == 6 && s->d == 2)
-        solve_sized(s, b, y, 7, 6, 2);
-    else if (s->nx == 3 && s->nv == 3 && s->d == 3)
-        solve_sized(s, b, y, 3, 3, 3);
-    else if (s->nx == 2 && s->nv == 2 && s->d == 3)
-        solve_sized(s, b, y, 2, 2, 3);
-    else
-        solve_sized(s, b, y, s->nx, s->nv, s->d);
+    DISPATCH(solve_sized, s, b, y)
 }
 
 /* ---- steps ------------------------------------------------------------------------------------------------------ */

@@ -63,7 +63,8 @@ def library() -> Any:
 
 def _kernel_with_lanes(form: dolfinx.fem.Form, number: int) -> tuple[int, Any]:
     """Address of a kernel of a form rewritten to do several elements at once, and what keeps it alive; or 0."""
-    code = Path(form.module.__file__.split(".")[0]).with_suffix(".c")
+    library = Path(form.module.__file__)
+    code = library.with_name(library.name.split(".")[0] + ".c")
     try:
         text = code.read_text(encoding="utf-8")
         module = _load(with_lanes(text, kernel_names(text)[number : number + 1]), DECLARATIONS)
@@ -227,7 +228,7 @@ class NativeSolver(_Form):
         held[rod.constrained] = 1
         if any(held.reshape(-1, block)[:, :nx].ravel()) or np.any(held.reshape(-1, block)[node[1:, 0]]):
             raise ValueError("the compiled engine holds velocities at the ends only")
-        s.n, s.d, s.nx, s.nv = n, d, nx, nv
+        s.n, s.d, s.nx, s.nv, s.check = n, d, nx, nv, 1
         s.element = self._pointer(element, "int32_t *")
         s.local, s.node = self._pointer(local, "int32_t *"), self._pointer(node, "int32_t *")
         s.held = self._pointer(held, "uint8_t *")
@@ -270,6 +271,7 @@ class NativeSolver(_Form):
         """Assemble and factorise the Jacobian at the present values of its coefficients."""
         if self._lib.factorise(self.s, self.c):
             raise ValueError("the kinematic rows of this rod reach beyond their nodes: use time.engine = 'petsc'")
+        self.s.check = 0
 
     def solve(self, b: Array) -> Array:
         """J^-1 b, shape (dofs,): a view, valid until the next."""

@@ -87,7 +87,9 @@ def _lock_up(line: Line, names: list[str], friction: str, buckled: bool) -> list
     if "tripping-in" in names:
         depth = lock_up_depth(line, OPERATIONS["tripping-in"], friction=friction, buckled=buckled)
         if depth is not None:
-            notes.append(f"tripping in: the hook load is used up with the bit at {depth:.0f} m, from there it needs a push")
+            notes.append(
+                f"tripping in: the hook load is used up with the bit at {depth:.0f} m, from there it needs a push"
+            )
     if "sliding" in names:
         most = greatest_weight(line, OPERATIONS["sliding"], friction=friction, buckled=buckled)
         notes.append(f"sliding: the string's own weight can put at most {most / 1e3:.1f} kN on the bit")

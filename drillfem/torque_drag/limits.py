@@ -61,6 +61,4 @@ def limits(line: Line, s: F8) -> Limits:
 
     low, mid, high = (load(x) for x in (SINUSOIDAL, HELICAL, WOUND_UP))
     helix = VERTICAL_HELICAL * vertical
-    return Limits(
-        s, np.maximum(low, VERTICAL_SINUSOIDAL * vertical), np.maximum(mid, helix), np.maximum(high, helix)
-    )
+    return Limits(s, np.maximum(low, VERTICAL_SINUSOIDAL * vertical), np.maximum(mid, helix), np.maximum(high, helix))

@@ -80,29 +80,30 @@ def buckling_text(profile: Profile, found: Limits) -> str:
 
 
 def print_table(study: Study, console: Console | None = None) -> None:
-    """Hook load, torque at the top, largest side force and buckling of every operation."""
+    """Hook load, torque at the top, largest side force and buckling of every operation; a line for each method."""
     several = len(study.profiles) > 1
     table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
-    table.add_column("")
-    for quantity in ("hook load\nkN", "surface torque\nkN m", "largest side force\nkN/m", "at\nm"):
-        for method in study.profiles:
-            table.add_column(f"{quantity}\n{method}" if several else quantity, justify="right")
+    table.add_column("", no_wrap=True)
+    if several:
+        table.add_column("", no_wrap=True)
+    for quantity in ("hook load\nkN", "torque\nkN m", "side force\nup to kN/m", "at\nm"):
+        table.add_column(quantity, justify="right", no_wrap=True)
     table.add_column("buckling")
-    for k, profile in enumerate(study.first):
-        each = [profiles[k] for profiles in study.profiles.values()]
-        side = [deepest(p, p.side_force) for p in each]
-        cells = [f"{p.hook_load / 1e3:.1f}" for p in each]
-        cells += [f"{p.surface_torque / 1e3:.2f}" if p.operation.spin else "-" for p in each]
-        cells += [f"{force / 1e3:.2f}" for force, _ in side] + [f"{depth:.0f}" for _, depth in side]
-        table.add_row(escape(profile.operation.title), *cells, buckling_text(profile, study.limits))
-    console = console or Console()
+    for k, first in enumerate(study.first):
+        for method, profiles in study.profiles.items():
+            p = profiles[k]
+            force, depth = deepest(p, p.side_force)
+            cells = [escape(first.operation.title) if p is first else "", *([method] if several else [])]
+            cells += [f"{p.hook_load / 1e3:.1f}", f"{p.surface_torque / 1e3:.2f}" if p.operation.spin else "-"]
+            table.add_row(*cells, f"{force / 1e3:.2f}", f"{depth:.0f}", buckling_text(p, study.limits))
+    console = console or Console(width=None if Console().is_terminal else 100)
     console.print(table)
     for note in study.notes:
-        console.print(note, markup=False, highlight=False)
+        console.print(note, markup=False, highlight=False, soft_wrap=True)
 
 
 def dataset(study: Study) -> xr.Dataset:
-    """All profiles over (method, operation, measured_depth), on the depths of the first method, SI units."""
+    """All profiles over (model, operation, measured_depth), model the method, on the depths of the first method, SI units."""
     first = study.first
     depth = first[0].measured_depth
     names = [p.operation.name for p in first]
@@ -114,9 +115,9 @@ def dataset(study: Study) -> xr.Dataset:
         ]
         return np.array(rows)
 
-    data = xr.Dataset(coords={"method": list(study.profiles), "operation": names})
+    data = xr.Dataset(coords={"model": list(study.profiles), "operation": names})
     data["measured_depth"] = ("measured_depth", depth, {"units": "m"})
-    over = ("method", "operation", "measured_depth")
+    over = ("model", "operation", "measured_depth")
     for name, units in (("tension", "N"), ("torque", "N m"), ("side_force", "N/m")):
         data[name] = (over, along(name), {"units": units})
     for name in ("sinusoidal", "helical", "wound_up"):
@@ -170,9 +171,11 @@ def draw(study: Study, path: Path) -> Path:
     with style.page(1900, 1050) as figure:
         methods = list(study.profiles)
         words = f"{length:,.0f} m of string".replace(",", "\u2009")
-        words += f"   \u00b7   {', '.join(methods)}-string" if methods == ["soft"] else f"   \u00b7   {', '.join(methods)}"
+        words += (
+            f"   \u00b7   {', '.join(methods)}-string" if methods == ["soft"] else f"   \u00b7   {', '.join(methods)}"
+        )
         style.heading(figure, f"{study.title}: torque and drag", words)
-        widths, gap = (0.115, 0.215, 0.17, 0.175, 0.145), 0.02
+        widths, gap = (0.115, 0.225, 0.175, 0.18, 0.16), 0.02
         lefts = [0.05]
         for width in widths[:-1]:
             lefts.append(lefts[-1] + width + gap)
@@ -200,6 +203,12 @@ def draw(study: Study, path: Path) -> Path:
                 colour, dash = COLOURS[p.operation.name], DASHES.get(method, "-")
                 look = {"color": colour, "ls": dash, "lw": 1.9}
                 pull.plot(p.tension / 1e3, p.measured_depth, **look)
+                for kind, pieces in buckled(p, limit):
+                    for a, b in pieces:
+                        at = np.linspace(a, b, 200)
+                        here = np.interp(at, p.measured_depth, p.tension) / 1e3
+                        wide = {"helix": 9.0, "sine": 5.0}[kind]
+                        pull.plot(here, at, color=style.PURPLE, lw=wide, alpha=0.75, zorder=1.5)
                 side.plot(p.side_force / 1e3, p.measured_depth, **look | {"lw": 1.2})
                 if p.operation.spin:
                     turning = True
@@ -224,8 +233,8 @@ def draw(study: Study, path: Path) -> Path:
         from matplotlib.patches import Patch
 
         handles += [
-            Patch(color=style.PURPLE, alpha=0.22, lw=0, label="would buckle: sine"),
-            Patch(color=style.PURPLE, alpha=0.42, lw=0, label="helix"),
+            Patch(color=style.PURPLE, alpha=0.22, lw=0, label="buckles: sine"),
+            Patch(color=style.PURPLE, alpha=0.42, lw=0, label="buckles: helix"),
         ]
         figure.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(0.043, 0.905), ncols=len(handles), columnspacing=1.8

@@ -135,9 +135,7 @@ def johancsik(
     return tension, torque, normal
 
 
-def stations(
-    line: Line, operation: Operation, *, friction: str = "dynamic", spacing: float | None = None
-) -> Profile:
+def stations(line: Line, operation: Operation, *, friction: str = "dynamic", spacing: float | None = None) -> Profile:
     """The same by Johancsik's sum, over the survey's stations (or every ``spacing`` m) and the joints of the string."""
     hole: Borehole = line.hole
     if spacing is None and hole.stations is not None:

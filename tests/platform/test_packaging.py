@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-LINKS = {"forms": "forms", "meshes": "meshes", "scenes": "demos/scenes"}
+LINKS = {"forms": "forms", "meshes": "meshes", "scenes": "demos/scenes", "surveys": "demos/surveys"}
 BUILD = "import sys; from setuptools import build_meta as b; print(getattr(b, sys.argv[1])(sys.argv[2]))"
 
 
@@ -49,7 +49,11 @@ def test_wheel_has_files_where_the_checkout_has_links(project: Path, tmp_path: P
     wheel = names(build("wheel", project, tmp_path / "wheel"))
     shipped = {f"drillfem/{p.relative_to(project / 'drillfem')}" for p in (project / "drillfem").rglob("*.py")}
     for name, target in LINKS.items():
-        found = {f"drillfem/{name}/{p.name}" for p in (project / target).iterdir() if p.suffix in (".py", ".toml")}
+        found = {
+            f"drillfem/{name}/{p.name}"
+            for p in (project / target).iterdir()
+            if p.suffix in (".py", ".toml", ".csv", ".md")
+        }
         assert found
         shipped |= found
     assert wheel == shipped | {"drillfem/py.typed"}

@@ -211,8 +211,8 @@ def test_sections_and_caliper():
     def wide(p):
         return 2 * np.interp(p, at, radius)
 
-    depths = np.array([0, 399, 400, 401, 649, 655, 660, 680, 690, 700, 700.4, 2000])
-    assert wide(depths) == pytest.approx([0.3, 0.3, 0.2, 0.2, 0.2, 0.36, 0.5, 0.2, 0.2, 0.2, 0.24, 0.24], abs=1e-9)
+    depths = np.array([0, 399, 400, 401, 649, 655, 660, 680, 690, 700, 700.4, 850, 2000])
+    assert wide(depths) == pytest.approx([0.3, 0.3, 0.2, 0.2, 0.2, 0.36, 0.5, 0.2, 0.2, 0.2, 0.24, 0.24, 0.2], abs=1e-9)
     # a step is cut into the wider side
     assert np.abs(np.diff(radius) / np.diff(at)).max() <= STEEPEST * (1 + 1e-9)
     assert wide(399.5) == pytest.approx(0.2 + 2 * STEEPEST * 0.5)
@@ -226,7 +226,16 @@ def test_one_diameter_everywhere():
 
 def test_friction_by_section_and_by_depth():
     at, mu = friction_profile(1000, 0.3, 0.2, [(400, 0.2, 0.1), (700, None, None), (800, 0.5, 0.4)])
-    for p, expected in ((0, 0.2), (399.99, 0.2), (400.01, 0.3), (699, 0.3), (701, 0.5), (5000, 0.5)):
+    for p, expected in (
+        (0, 0.2),
+        (399.99, 0.2),
+        (400.01, 0.3),
+        (699, 0.3),
+        (701, 0.5),
+        (799, 0.5),
+        (801, 0.3),
+        (5000, 0.3),
+    ):
         assert np.interp(p, at, mu[:, 0]) == pytest.approx(expected, abs=1e-12)
     assert np.all(np.diff(at) > 0)
     assert np.interp(500, at, mu[:, 1]) == pytest.approx(0.2)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -47,25 +46,10 @@ Over = dict[str, Any]
 DEGREE = math.pi / 180
 
 
-@dataclass(frozen=True)
-class SurveyedHole(Hole):
-    """A hole that is described by its survey: rows of measured depth (m), inclination and azimuth (rad)."""
-
-    stations: tuple[tuple[float, float, float], ...] = ()
-
-
-@dataclass(frozen=True)
-class CurvedHole(Hole):
-    """A hole that knows its curvature (1/m) and inclination (rad) at an arc length."""
-
-    curvature: Callable[[float], float] = abs
-    inclination: float = 0.0
-
-
 def surveyed(*stations: tuple[float, float, float]) -> Scene:
-    """The thesis' string in a hole that calls itself straight."""
+    """The thesis' string in a surveyed hole: rows of measured depth (m), inclination and azimuth (rad)."""
     scene = load_scene("vertical-c1-cd4")
-    return replace(scene, hole=SurveyedHole("straight", scene.hole.diameter, stations))
+    return replace(scene, hole=Hole("survey", scene.hole.diameter, survey=stations))
 
 
 def column(length: float, **ends: str) -> Scene:
@@ -92,7 +76,6 @@ def column(length: float, **ends: str) -> Scene:
 # -- the hole: trap 1, a "straight" hole with a dogleg ----------------------------------------------------
 def test_a_straight_hole_with_a_dogleg_is_not_straight() -> None:
     scene = surveyed((0, 0, 0), (600, 0, 0), (630, 3 * DEGREE, 0), (660, 0, 0), (1300, 0, 0))
-    assert scene.hole.kind == "straight"
     choice = lowest(scene)
     assert choice.name == "spatial"
     assert "bends by 3 deg per 30 m" in choice.reason
@@ -102,64 +85,62 @@ def test_a_straight_hole_with_a_dogleg_is_not_straight() -> None:
     curvature = 3 * DEGREE / 30
     collars = scene.string[1]
     numbers = found.numbers
-    assert numbers["curvature"] == pytest.approx(curvature, rel=1e-9)
+    assert numbers["curvature"] == pytest.approx(curvature, rel=1e-8)
     assert numbers["bending_moment"] == pytest.approx(collars.section_stiffness().bending1 * curvature)
     assert numbers["bending_stress"] == pytest.approx(210e9 * 0.0762 * curvature)
     # tension at the middle of the sharpest interval, 615 m (or 645 m): hook load less the weight above
     per_metre = scene.string[0].mass_per_length * 9.80665
     hook = scene.nominal().hook_load
     assert numbers["side_force"] == pytest.approx((hook - 630 * per_metre) * curvature, rel=0.03)
-    # capstan: 6 degrees in all, at most the hook load
-    assert numbers["friction_torque"] == pytest.approx(0.15 * 0.0762 * hook * 6 * DEGREE)
+    # capstan: 6 degrees in all, at most the hook load; within 5 m the bend turns over, which takes some off
+    assert numbers["friction_torque"] == pytest.approx(0.15 * 0.0762 * hook * (6 - 0.25) * DEGREE, rel=1e-3)
 
 
 def test_the_same_survey_without_the_dogleg_is_straight() -> None:
     scene = surveyed((0, 0, 0), (600, 0, 0), (1300, 0, 0))
-    assert bend_of(scene.hole, scene.length) is None
+    assert bend_of(scene) is None
     assert lowest(scene) == lowest(load_scene("vertical-c1-cd4"))
     assert hole_rule(scene).needs == "lumped"
 
 
 def test_a_turn_in_azimuth_alone_is_a_dogleg() -> None:
-    bend = bend_of(SurveyedHole(stations=((0, 0.5, 0.0), (30, 0.5, 0.1))), 30.0)
+    bend = bend_of(surveyed((0, 0.5, 0.0), (600, 0.5, 0.0), (630, 0.5, 0.1), (1300, 0.5, 0.1)))
     assert bend is not None
     exact = math.acos(math.cos(0.5) ** 2 + math.sin(0.5) ** 2 * math.cos(0.1))  # minimum curvature
-    assert bend.turn == pytest.approx(exact, rel=1e-9)
-    assert bend.curvature == pytest.approx(exact / 30, rel=1e-9)
+    assert bend.turn == pytest.approx(exact, rel=1e-4)
+    assert bend.curvature == pytest.approx(exact / 30, rel=1e-8)
 
 
 def test_an_inclined_straight_hole_loads_the_string_from_the_side() -> None:
     scene = surveyed((0, 0.2, 0), (1300, 0.2, 0))
-    assert bend_of(scene.hole, scene.length) is None
-    assert inclination_of(scene.hole, scene.length) == 0.2
+    assert bend_of(scene) is None
+    assert inclination_of(scene) == pytest.approx(0.2)
     assert lowest(scene).name == "spatial"
     load = side_load_rule(scene)
     assert load.needs == "spatial"
     assert load.numbers["side_load"] == pytest.approx(scene.string[1].mass_per_length * 9.80665 * math.sin(0.2))
 
 
-def test_a_hole_that_knows_its_curvature() -> None:
-    hole = CurvedHole("straight", 0.3, curvature=lambda s: 1e-3 * (400 < s < 500))
-    bend = bend_of(hole, 1000.0)
+@pytest.mark.parametrize(
+    "hole, curvature, turn, inclination",
+    [
+        (Hole("arc", 0.3, radius=2000.0), 1 / 2000, 1200 / 2000, 1200 / 2000),
+        (Hole("build", 0.3, kick_off=300.0, radius=573.0, final_inclination=0.5), 1 / 573, 0.5, 0.5),
+        # radius 100 m, 300 m down per turn: curvature r/(r^2 + (pitch/2 pi)^2)
+        (Hole("helix", 0.3, radius=100.0, pitch=300.0), 100 / (100**2 + (150 / math.pi) ** 2), None, None),
+    ],
+)
+def test_a_hole_is_what_its_geometry_is(
+    hole: Hole, curvature: float, turn: float | None, inclination: float | None
+) -> None:
+    scene = replace(load_scene("vertical-c1-cd4"), hole=hole)
+    bend = bend_of(scene)
     assert bend is not None
-    assert bend.curvature == 1e-3
-    assert 400 < bend.at < 500
-    assert bend.turn == pytest.approx(0.1, rel=0.02)
-    assert bend_of(CurvedHole("straight", 0.3, curvature=lambda _: 0.0), 1000.0) is None
-
-
-@pytest.mark.parametrize("known", [{"radius": 573.0}, {"dogleg_severity": 1 / 573}, {"curvature": -1 / 573}])
-def test_one_number_may_say_the_curvature(known: dict[str, float]) -> None:
-    hole = type("Hole", (), {"kind": "arc", **known})()
-    bend = bend_of(hole, 100.0)
-    assert bend is not None
-    assert bend.curvature == pytest.approx(1 / 573)
-
-
-def test_a_hole_of_an_unknown_kind_is_taken_as_bent() -> None:
-    found = hole_rule(load_scene("vertical-c1-cd4"), type("Hole", (), {"kind": "helix"})())
-    assert found.needs == "spatial"
-    assert math.isnan(found.numbers["curvature"])
+    assert bend.curvature == pytest.approx(curvature, rel=1e-6)
+    assert bend.turn == pytest.approx(turn or 1200 * curvature, rel=1e-3)
+    expected = math.atan(2 * math.pi * 100 / 300) if inclination is None else inclination
+    assert inclination_of(scene) == pytest.approx(expected, rel=1e-6)
+    assert lowest(scene).name == "spatial"
 
 
 def test_a_bent_string_in_a_straight_hole_is_noticed() -> None:
