@@ -4,10 +4,13 @@ OUT ?= results
 ARGS ?=
 IMAGE ?= drillfem
 
-.PHONY: demo test lint verify image
+.PHONY: demo demo-well test lint verify image
 
 demo: ## the main job: a 1200 m string drills rock; history, pictures and a table in $(OUT)/demo
 	$(RUN) drillfem demo --out $(OUT)/demo
+
+demo-well: ## a string starts to turn in a real, horizontal well; pictures, a film, torque and drag in $(OUT)/demo-well
+	$(RUN) drillfem demo well --out $(OUT)/demo-well
 
 test: ## the fast tests; ARGS="-k bit -x" goes to pytest
 	$(RUN) pytest $(ARGS)

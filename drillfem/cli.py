@@ -155,7 +155,10 @@ def resume(folder: Folder, until: Until = None) -> None:
 @app.command()
 def render(
     folder: Folder,
-    time: Annotated[str | None, typer.Option(metavar="SECONDS", help="Which moment; the last by default.")] = None,
+    time: Annotated[
+        list[str] | None,
+        typer.Option(metavar="SECONDS", help="Which moment; the last by default; repeat it to compare along a well."),
+    ] = None,
     field: Annotated[str | None, typer.Option(metavar="NAME", help="What colours the string.")] = None,
     film: Annotated[bool, typer.Option("--film", help="Make a film too.")] = False,
     window: Annotated[
@@ -163,7 +166,7 @@ def render(
     ] = None,
 ) -> None:
     """Make pictures of a result."""
-    at = _seconds(time, "--time")
+    at = [found for text in time or [] if (found := _seconds(text, "--time")) is not None] or None
     windows = [_window(text) for text in window or []] or None
     from drillfem.results import is_result, open_result
 
@@ -177,13 +180,17 @@ def render(
 
 @app.command()
 def demo(
+    job: Annotated[
+        str,
+        typer.Argument(metavar="[JOB]", help="drilling: a 1200 m string in rock; well: a real, horizontal well."),
+    ] = "drilling",
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the result.")] = Path("drillfem-demo"),
 ) -> None:
-    """Drill with a 1200 m string: history, pictures, and a table."""
+    """Drill with a 1200 m string, or turn one in a real well: history, pictures, and a table."""
     from drillfem.demo import main as run_demo
 
     with _keeping(out):
-        run_demo(out)
+        run_demo(out, job)
 
 
 @app.command()
@@ -290,7 +297,7 @@ def torque_drag(
         typer.Option(metavar="NAME", help="rotating, tripping-out, tripping-in, drilling, sliding; may be repeated."),
     ] = None,
     method: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="soft, stations; may be repeated to compare.")
+        list[str] | None, typer.Option(metavar="NAME", help="soft, stations, stiff (a rod); may be repeated to compare.")
     ] = None,
     set_: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key.")] = None,
     weight_on_bit: Annotated[str | None, typer.Option(metavar="LOAD", help="On bottom: '50 kN'.")] = None,
@@ -306,6 +313,21 @@ def torque_drag(
 
     loaded = load_scene(scene, _overrides(set_))
     compute(loaded, out, operation, method, weight_on_bit, torque_on_bit, friction, buckled)
+
+
+@app.command()
+def buckling(
+    scene: SceneName,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="New folder for picture and numbers.")],
+    weight_on_bit: Annotated[str, typer.Option(metavar="LOAD", help="Push so hard: '200 kN'.")],
+    steps: Annotated[int, typer.Option(metavar="N", help="Steps from no push to that.")] = 10,
+    set_: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key.")] = None,
+) -> None:
+    """Push a string into its hole, without friction, and see where it snakes and winds."""
+    from drillfem.buckling.command import run as push
+    from drillfem.scene import load_scene
+
+    push(load_scene(scene, _overrides(set_)), out, weight_on_bit, steps)
 
 
 @app.command("warm-up")

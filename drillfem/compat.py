@@ -180,6 +180,10 @@ class VectorForm:
         cpp.assemble_vector(out, self._cpp, cpp.pack_constants(self._cpp), cpp.pack_coefficients(self._cpp))
         return out
 
+    def at_ends(self, out: Array) -> Array:
+        """Assemble; only the end conditions' rows of ``out`` need be right."""
+        return self(out)
+
 
 class ScalarForm:
     """A compiled functional."""

@@ -10,11 +10,14 @@ The unknown is one vector field ``u = (configuration, velocity)``. An ansatz map
 | planar          | x, z, theta        | their rates         | (x, 0, z), R about e2      |
 | axial-torsional | z, phi             | their rates         | (0, 0, z), R about e3      |
 | torsional       | phi                | its rate            | (0, 0, s), R about e3      |
+
+Where the hole's closest point is solved with the rod (D-6), its measured depth p is one more configuration field. It
+has no velocity: an algebraic equation ties it to r.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import ufl
 from ufl.core.expr import Expr
@@ -28,6 +31,9 @@ from .kinematics import (
     rotation_about,
     rotation_of_quaternion,
 )
+
+#: Name of the measured depth of the closest point among the configuration fields: the last one of them.
+DEPTH = "hole_depth"
 
 
 @dataclass(frozen=True)
@@ -52,6 +58,15 @@ class Ansatz:
         """Component of the unknown that carries this name."""
         return (self.x_names + self.v_names).index(name)
 
+    @property
+    def bare(self) -> Ansatz:
+        """The same without the measured depth among its fields."""
+        return replace(self, x_names=tuple(name for name in self.x_names if name != DEPTH))
+
+    def depth(self, x: Expr) -> Expr | None:
+        """Measured depth of the closest point (m) where it is among the configuration fields ``x`` (or their tests)."""
+        return x[self.index(DEPTH)] if DEPTH in self.x_names else None
+
     def configuration(self, x: Expr, s: Expr) -> Configuration:
         """Configuration of the rod; ``s`` is the arc length of the reference rod."""
         raise NotImplementedError
@@ -69,7 +84,7 @@ class Ansatz:
         return self.twist(test, None)
 
     def rate(self, x: Expr, v: Expr) -> Expr:
-        """Time derivative of the configuration fields that belongs to a velocity field."""
+        """Time derivative of the configuration fields that belongs to a velocity field (not of the measured depth)."""
         return v
 
     def constraint(self, x: Expr, test: Expr) -> Expr | None:
@@ -88,7 +103,7 @@ class Planar(_Minimal):
     """Motion in the (e1, e3) plane, rotation about e2."""
 
     def configuration(self, x: Expr, s: Expr) -> Configuration:
-        return configuration(ufl.as_vector((x[0], 0, x[1])), rotation_about(2, x[2]))
+        return replace(configuration(ufl.as_vector((x[0], 0, x[1])), rotation_about(2, x[2])), p=self.depth(x))
 
     def twist(self, v: Expr, at: Configuration | None) -> Twist:
         return Twist(ufl.as_vector((v[0], 0, v[1])), ufl.as_vector((0, v[2], 0)))
@@ -129,7 +144,7 @@ class Spatial(Ansatz):
 
     def configuration(self, x: Expr, s: Expr) -> Configuration:
         r, q = ufl.as_vector([x[i] for i in range(3)]), self.quaternion(x)
-        return Configuration(r, rotation_of_quaternion(q), material_rate_of_quaternion(q, q.dx(0)))
+        return Configuration(r, rotation_of_quaternion(q), material_rate_of_quaternion(q, q.dx(0)), self.depth(x))
 
     @staticmethod
     def quaternion(x: Expr) -> Expr:
@@ -160,10 +175,10 @@ class Spatial(Ansatz):
         return (ufl.dot(q, q) - 1) * test[3]
 
 
-def ansatz(name: str, literal: bool = False) -> Ansatz:
+def ansatz(name: str, literal: bool = False, depth: bool = False) -> Ansatz:
     """The ansatz called ``name``: spatial, planar, axial-torsional or torsional.
 
-    Raises KeyError for any other name.
+    depth: with the measured depth of the closest point among its fields. Raises KeyError for any other name.
     """
     makers = {
         "spatial": lambda: Spatial(
@@ -176,4 +191,5 @@ def ansatz(name: str, literal: bool = False) -> Ansatz:
         "axial-torsional": lambda: AxialTorsional(name, ("r3", "phi"), ("v3", "w3")),
         "torsional": lambda: Torsional(name, ("phi",), ("w3",)),
     }
-    return makers[name]()
+    found = makers[name]()
+    return replace(found, x_names=(*found.x_names, DEPTH)) if depth else found

@@ -8,15 +8,17 @@ evaluates the very terms that are solved.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import ufl
 from ufl.core.expr import Expr
 
 from .ansatz import Ansatz
 from .constitutive import Section, elastic_resultants, viscous_resultants
+from .drive import Motor, motor
 from .kinematics import E3, Configuration, Twist, strain_rates, strains
-from .wall import Hole, Wall, contact, friction
+from .mud import Mud, added_energy, added_inertia, buoyancy, drag
+from .wall import Hole, Wall, closest_point, contact, friction
 
 Terms = dict[str, ufl.Form]
 
@@ -108,7 +110,10 @@ class Lump:
 
 @dataclass(frozen=True)
 class Loads:
-    """What acts on the rod besides itself; absent parts are None."""
+    """What acts on the rod besides itself; absent parts are None.
+
+    ``centreline``: the hole at the nodes, where its measured depth is an unknown.
+    """
 
     g: Expr
     u0: Expr
@@ -117,6 +122,9 @@ class Loads:
     bit: BitLoad | None = None
     wall: Wall | None = None
     lump: Lump | None = None
+    motor: Motor | None = None
+    mud: Mud | None = None
+    centreline: Hole | None = None
 
 
 def virtual_work(
@@ -152,10 +160,18 @@ def virtual_work(
         terms["lumped inertia"] = end_load(x, twist, rate, virtual, loads.lump.attached) * on.bottom
     if loads.wall is not None:
         radius = section["contact_radius"]
-        terms["contact"] = contact(x, virtual, radius, loads.wall) * on.wall
+        terms["contact"] = contact(x, twist, virtual, radius, loads.wall) * on.wall
         terms["friction"] = friction(x, twist, virtual, radius, loads.wall) * on.wall
     if loads.bit is not None:
         terms["bit"] = bit_load(x, virtual, loads.bit) * on.bottom
+    if loads.motor is not None:
+        terms["motor"] = motor(x, twist, rate, virtual, loads.motor) * on.top
+    if loads.mud is not None:
+        terms["buoyancy"] = buoyancy(virtual, loads.mud, loads.g) * on.mass
+        if loads.mud.moves:
+            terms["mud inertia"] = added_inertia(x, twist, rate, virtual, loads.mud) * on.mass
+        if loads.mud.drags:
+            terms["mud drag"] = drag(x, twist, virtual, loads.mud) * on.mass
     return terms
 
 
@@ -177,7 +193,11 @@ def dynamic_terms(
     (x, v), (x_dot, v_dot), (test_x, test_v) = a.split(u), a.split(u_dot), a.split(test)
     at = a.configuration(x, s)
     terms = virtual_work(at, a.twist(v, at), a.twist(v_dot, at), a.twist(test_v, at), section, loads, on, literal)
-    terms["kinematics"] = ufl.dot(test_x, x_dot - a.rate(x, v)) * on.nodal
+    rates = a.rate(x, v)
+    tested, found = (ufl.as_vector([f[i] for i in range(len(rates))]) for f in (test_x, x_dot))
+    terms["kinematics"] = ufl.dot(tested, found - rates) * on.nodal
+    if loads.centreline is not None:
+        terms["closest point"] = closest_point(at, a.depth(test_x), loads.centreline) * on.nodal
     return terms
 
 
@@ -210,6 +230,7 @@ def static_terms(
     """
     at = a.configuration(x, s)
     still = Twist(0 * at.r, 0 * at.u_m)
+    loads = replace(loads, motor=None, mud=replace(loads.mud, moves=False, drags=False) if loads.mud else None)
     terms = virtual_work(at, still, still, a.virtual(test), section, loads, on, literal)
     g = a.constraint(x, test)
     if support is not None and loads.wall is not None:
@@ -230,6 +251,8 @@ def kinetic_energy(a: Ansatz, u: Expr, s: Expr, section: Section, loads: Loads, 
 
     density = section["mass"] * ufl.dot(t.v, t.v) + ufl.dot(t.w, section.Theta * t.w)
     energy = density / 2 * on.mass + at_end(loads.top) * on.top + at_end(loads.bottom) * on.bottom
+    if loads.mud is not None and loads.mud.moves:
+        energy += added_energy(at, t, loads.mud) * on.mass
     return energy + at_end(loads.lump.attached) * on.bottom if loads.lump else energy
 
 

@@ -78,7 +78,7 @@ class Wall(Hole):
 
     ``stiffness`` k_s (N/m2); ``smoothing`` (m) of the method "smooth"; ``velocity_scale`` n (s/m); ``regularisation``
     eps. ``method``: penalty, smooth or augmented. ``projected``: friction along the wall only (else the literal,
-    unprojected velocity).
+    unprojected velocity). ``retardation`` (s): what presses is the penetration, and this times its rate; None: no rate.
     """
 
     stiffness: Expr
@@ -87,6 +87,7 @@ class Wall(Hole):
     regularisation: Expr
     method: str = "penalty"
     projected: bool = True
+    retardation: Expr | None = None
 
 
 def _contact(x: Configuration, radius: Expr, wall: Wall) -> tuple[Expr, Expr]:
@@ -95,6 +96,21 @@ def _contact(x: Configuration, radius: Expr, wall: Wall) -> tuple[Expr, Expr]:
     distance = ufl.sqrt(ufl.dot(offset, offset) + 1e-24)
     hole = wall["hole_radius"] + wall["radius_slope"] * wall.advance(x.r, x.p)
     return offset / distance, distance + radius - hole
+
+
+def _closing(x: Configuration, v: Expr, normal: Expr, wall: Wall) -> Expr:
+    """Rate of the penetration (m/s) along a velocity v (3), or its variation along a virtual one."""
+    away, t = wall.offset(x.r, x.p), wall.direction(x.r, x.p)
+    along = ufl.dot(t, v) / (ufl.dot(t, t) - ufl.dot(wall._vector("second"), away))
+    return ufl.dot(normal, v) - wall["radius_slope"] * along
+
+
+def _pressed(x: Configuration, twist: Twist, radius: Expr, wall: Wall) -> tuple[Expr, Expr]:
+    """Outward normal (3) and normal force per length (N/m)."""
+    normal, g = _contact(x, radius, wall)
+    if wall.retardation is not None:
+        g = g + wall.retardation * _closing(x, twist.v, normal, wall)
+    return normal, wall_pressure(g, wall)
 
 
 def wall_pressure(penetration: Expr, wall: Wall) -> Expr:
@@ -131,15 +147,13 @@ def friction_coefficient(speed: Expr, wall: Wall) -> Expr:
     return (mu_d * ufl.sqrt(speed**2 + wall.regularisation / n**2) + 2 * alpha / n) / (speed**2 + 1 / n**2)
 
 
-def contact(x: Configuration, virtual: Twist, radius: Expr, wall: Wall) -> Expr:
+def contact(x: Configuration, twist: Twist, virtual: Twist, radius: Expr, wall: Wall) -> Expr:
     """Virtual work of the wall's normal force, per length (arm and force are parallel: no moment).
 
     Where the hole narrows the force has a part along it: both come from the one potential.
     """
-    normal, g = _contact(x, radius, wall)
-    away, t = wall.offset(x.r, x.p), wall._vector("tangent")
-    along = ufl.dot(t, virtual.v) / (ufl.dot(t, t) - ufl.dot(wall._vector("second"), away))
-    return wall_pressure(g, wall) * (ufl.dot(normal, virtual.v) - wall["radius_slope"] * along)
+    normal, force = _pressed(x, twist, radius, wall)
+    return force * _closing(x, virtual.v, normal, wall)
 
 
 def sliding(x: Configuration, twist: Twist, radius: Expr, normal: Expr) -> Expr:
@@ -149,9 +163,23 @@ def sliding(x: Configuration, twist: Twist, radius: Expr, normal: Expr) -> Expr:
 
 def friction(x: Configuration, twist: Twist, virtual: Twist, radius: Expr, wall: Wall) -> Expr:
     """Virtual work of the wall friction on the touching point, per length (4-7)-(4-12)."""
-    normal, g = _contact(x, radius, wall)
+    normal, force = _pressed(x, twist, radius, wall)
     v_c = sliding(x, twist, radius, normal)
     if wall.projected:
         v_c = v_c - ufl.dot(v_c, normal) * normal
     mu = friction_coefficient(ufl.sqrt(ufl.dot(v_c, v_c) + 1e-24), wall)
-    return wall_pressure(g, wall) * mu * ufl.dot(v_c, sliding(x, virtual, radius, normal))
+    return force * mu * ufl.dot(v_c, sliding(x, virtual, radius, normal))
+
+
+def steady_friction(
+    x: Configuration, virtual: Twist, radius: Expr, wall: Wall, coefficient: Expr, speed: Expr, spin: Expr
+) -> Expr:
+    """Virtual work of the wall friction on a string that slides steadily as a whole, per length.
+
+    ``speed`` along the hole (down is positive, m/s) and ``spin`` about it (rad/s) give the direction in which every
+    touching point slides; only their ratio counts. ``coefficient``: friction over normal force.
+    """
+    normal, g = _contact(x, radius, wall)
+    t = wall.tangent(x.r, x.p)
+    along = (speed * t + spin * radius * ufl.cross(t, normal)) / ufl.sqrt(speed**2 + (spin * radius) ** 2)
+    return coefficient * wall_pressure(g, wall) * ufl.dot(along, sliding(x, virtual, radius, normal))

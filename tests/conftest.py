@@ -13,7 +13,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 #: Folders and files whose modules need DOLFINx to be read.
-_ROD = ("forms/", "convergence/", "physics/test_rod", "stability/test_rod")
+_ROD = ("forms/", "convergence/", "physics/test_rod", "stability/test_rod", "stability/test_contact_rod")
 collect_ignore_glob = [] if find_spec("dolfinx") else [f"{folder}*" for folder in _ROD]
 
 

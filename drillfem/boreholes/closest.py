@@ -26,6 +26,7 @@ _MOST = 50  # iterations
 _CLOSE = 1e-9  # (r - c) . t that is nought, m
 _REACH = 20.0  # longest step of an iteration, m
 _STEEP = 0.25  # least -g' that a step is made with
+_NEXT = 1e-4  # distance along the hole that a row of `project` carries, m: the forms go it by themselves, to 1e-11 m
 
 
 class Projection(NamedTuple):
@@ -155,6 +156,21 @@ def piece(table: Table, r: F8, p: float, out: F8) -> float:
 
 
 @kernel(lean=True)
+def _carry(out: F8, i: int, r0: float, r1: float, r2: float) -> tuple[float, float]:
+    """Distance (m) along the hole from row i of `project` to the closest point of r, and the room there from r to the
+    wall (m): what the forms make of the row. nan for a row of zeros."""
+    d0, d1, d2 = r0 - out[i, 0], r1 - out[i, 1], r2 - out[i, 2]
+    t0, t1, t2, k0, k1, k2 = out[i, 3], out[i, 4], out[i, 5], out[i, 6], out[i, 7], out[i, 8]
+    slope = t0 * t0 + t1 * t1 + t2 * t2 - d0 * k0 - d1 * k1 - d2 * k2
+    if slope <= 0.0:
+        return math.nan, math.nan
+    d = (d0 * t0 + d1 * t1 + d2 * t2) / slope
+    half = d * d / 2
+    d0, d1, d2 = d0 - t0 * d - k0 * half, d1 - t1 * d - k1 * half, d2 - t2 * d - k2 * half
+    return d, out[i, 9] + out[i, 10] * d - math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+
+
+@kernel(lean=True)
 def project(u: F8, size: int, cells: I4, basis: F8, radius: F8, table: Table, p: F8, out: F8) -> Projection:
     """What the wall of a hole tells every quadrature point of a string.
 
@@ -164,7 +180,8 @@ def project(u: F8, size: int, cells: I4, basis: F8, radius: F8, table: Table, p:
     dr/dp (3), d2r/dp2 (3), radius of the hole and its slope, static and dynamic friction; the pressure is not touched,
     nor is friction where the table has none.
 
-    A lost point keeps its last p and row.
+    A row is kept as long as the point stays next to it: the forms take the rest of the way by its quadratic piece. Rows
+    of zeros are always renewed. A lost point keeps its last p and row.
     """
     gap, narrow, lost, first = math.inf, -1, 0, -1
     low, high = math.inf, -math.inf
@@ -179,19 +196,23 @@ def project(u: F8, size: int, cells: I4, basis: F8, radius: F8, table: Table, p:
                 r0 += share * u[at]
                 r1 += share * u[at + 1]
                 r2 += share * u[at + 2]
-            new, found, c0, c1, c2, t0, t1, t2, k0, k1, k2 = _nearest(knots, coefficients, r0, r1, r2, p[i])
-            if not found:
-                lost += 1
-                if first < 0:
-                    first = i
-                continue
-            p[i] = new
+            new = p[i]
+            ahead, room = _carry(out, i, r0, r1, r2)
+            if not abs(ahead) <= _NEXT:
+                new, found, c0, c1, c2, t0, t1, t2, k0, k1, k2 = _nearest(knots, coefficients, r0, r1, r2, p[i])
+                if not found:
+                    lost += 1
+                    if first < 0:
+                        first = i
+                    continue
+                p[i] = new
+                out[i, 0], out[i, 1], out[i, 2] = c0, c1, c2
+                out[i, 3], out[i, 4], out[i, 5] = t0, t1, t2
+                out[i, 6], out[i, 7], out[i, 8] = k0, k1, k2
+                _fill(table, new, out, i)
+                ahead, room = _carry(out, i, r0, r1, r2)
             low, high = min(low, new), max(high, new)
-            out[i, 0], out[i, 1], out[i, 2] = c0, c1, c2
-            out[i, 3], out[i, 4], out[i, 5] = t0, t1, t2
-            out[i, 6], out[i, 7], out[i, 8] = k0, k1, k2
-            wide = _fill(table, new, out, i)
-            room = wide - radius[c] - math.sqrt((r0 - c0) ** 2 + (r1 - c1) ** 2 + (r2 - c2) ** 2)
+            room -= radius[c]
             if room < gap:
                 gap, narrow = room, i
     return Projection(gap, narrow, lost, first, low, high)

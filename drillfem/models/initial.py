@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..compat import Array
-from ..forms.ansatz import Spatial
+from ..forms.ansatz import DEPTH, Spatial
+from ..scene.nominal import Nominal
 from .rod import Rod
-from .steady import spin_perturbation, stretch_and_twist
+from .steady import start_of_drilling, stretch_and_twist
 
 
 def initial_state(rod: Rod) -> Array:
@@ -24,15 +25,16 @@ def initial_state(rod: Rod) -> Array:
         state["r1"], state["r2"] = offset * b[0], offset * b[1]
         state["r3"] = reference.radius * np.sin(bend)
     turn: Array = np.zeros(len(s))
-    if rod.has_bit:
-        nominal = scene.nominal()
+    if scene.initial.state == "laid":
+        hanging = Nominal(0.0, 0.0, 0.0, scene.weight, 0.0)
+        state["r3"] = s + stretch_and_twist(scene, s, hanging)[0]
+    elif rod.has_bit:
         f, psi = stretch_and_twist(scene, s)
         state["r3"] = s + f
         if scene.initial.state != "literal":
             turn = psi
         if scene.initial.state != "rest":
-            state["v3"][:] = nominal.rate_of_penetration
-            state["w3"] = (scene.top_drive.speed or 0.0) + spin_perturbation(scene) * s / rod.length
+            state["v3"][:], state["w3"] = start_of_drilling(scene, s)
     if scene.initial.state == "given":
         # a rigid motion of the unstressed string: v = v_0 + w x r, and w in the axes of the sections
         w = np.asarray(scene.initial.angular_velocity)
@@ -46,6 +48,7 @@ def initial_state(rod: Rod) -> Array:
         state |= {f"v{k + 1}": v[:, k] for k in range(3)} | {f"w{k + 1}": w_m[:, k] for k in range(3)}
     state["phi"] = turn
     state["theta"] = bend
+    state[DEPTH] = state["r3"]  # of a hole along e3
     if isinstance(a, Spatial):
         axis = np.cross((0.0, 0.0, 1.0), b)
         c, d = np.cos(bend / 2), np.sin(bend / 2)

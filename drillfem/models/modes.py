@@ -101,7 +101,7 @@ def natural_frequencies(rod: Rod, count: int = 10, u: Array | None = None) -> di
         k, c, m = (X[dofs][:, dofs] for X in (K, C, M))
         scale = _slow(rod, family)
         # not quite symmetric: virtual rotations are interpolated, the quaternions that they vary are too
-        squares, vectors = _eigenpairs(k, m, min(count + _SPARE, len(dofs)), -scale)
+        squares, vectors = eigenpairs(k, m, min(count + _SPARE, len(dofs)), -scale)
         order = np.argsort(squares.real)
         order = order[squares.real[order] > 1e-3 * scale][:count]
         squares, vectors = squares[order], vectors[:, order]
@@ -234,7 +234,7 @@ def _petsc(*matrices: sp.csr_matrix) -> Iterator[list[PETSc.Mat]]:
             m.destroy()
 
 
-def _eigenpairs(k: sp.csr_matrix, m: sp.csr_matrix, count: int, near: float) -> tuple[npt.NDArray, npt.NDArray]:
+def eigenpairs(k: sp.csr_matrix, m: sp.csr_matrix, count: int, near: float) -> tuple[npt.NDArray, npt.NDArray]:
     """The ``count`` eigenvalues of k x = lambda m x nearest to the number ``near``, and their vectors (n, count)."""
     solver = SLEPc.EPS().create(PETSc.COMM_SELF)
     with _petsc(k, m) as (stiffness, mass):

@@ -9,10 +9,12 @@ from typing import Any
 
 import dolfinx
 import numpy as np
+import numpy.typing as npt
 import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..bitrock.jit import kernel
 from ..boreholes.closest import piece
 from ..compat import (
     Array,
@@ -29,11 +31,16 @@ from ..forms import virtual_work as vw
 from ..forms.ansatz import Ansatz, Spatial, ansatz
 from ..forms.constitutive import SECTION, Section, elastic_resultants, viscous_resultants
 from ..forms.kinematics import Twist
-from ..forms.wall import Hole, Wall, friction
+from ..forms.mud import MUD, Mud
+from ..forms.wall import Hole, Wall, friction, wall_energy
 from ..meshes.string import BOTTOM, TOP, StringMesh, string_mesh
 from ..scene import Scene
+from ..scene.mud import mud_properties
 from ..scene.nominal import lumped_at_bit
+from ..scene.tables import E3
+from .drive import law_of
 from .steady import outer_diameter
+from .top_drive import TopTorque
 from .wall import WallPoints
 
 #: Velocity components that an end condition holds; the spin of a driven top is imposed by the drive instead.
@@ -82,8 +89,8 @@ def section_field(scene: Scene, mesh: StringMesh) -> dolfinx.fem.Function:
     return field
 
 
-def measures(mesh: StringMesh, degree: int, reduced: bool = True) -> vw.Measures:
-    """Integration rules for fields of this degree.
+def measures(mesh: StringMesh, degree: int, reduced: bool = True, wall_degree: int = 0) -> vw.Measures:
+    """Integration rules for fields of this degree; ``wall_degree``: degree of the rule of contact, 0 for that of mass.
 
     Internal work: ``degree`` Gauss points, exact for the products of strains that can be exact without locking
     (fully integrated P1 is 1458 times too stiff in bending on 12.5 m of drill pipe). Kinematics: Gauss-Lobatto points,
@@ -94,17 +101,39 @@ def measures(mesh: StringMesh, degree: int, reduced: bool = True) -> vw.Measures
         {"quadrature_degree": 2 * degree - 1 if reduced else 2 * degree},
         {"quadrature_degree": 2 * degree},
         {"quadrature_rule": "GLL", "quadrature_degree": 2 * degree - 1},
+        {"quadrature_degree": wall_degree or 2 * degree},
     ]
-    if degree == 1:
+    if degree == 1 or wall_degree == 1:
         # a kernel of its own for each rule: FFCx 0.9 takes fields at the single point of one rule for their values at
         # the points of the other rules in the same kernel
         every = np.arange(mesh.cells.values.size, dtype=np.int32)
-        dx = ufl.Measure("dx", mesh.mesh, subdomain_data=[(k, every) for k in range(3)])
-        internal, full, nodal = (dx(k, metadata=rule) for k, rule in enumerate(rules))
+        dx = ufl.Measure("dx", mesh.mesh, subdomain_data=[(k, every) for k in range(4)])
+        internal, full, nodal, wall = (dx(k, metadata=rule) for k, rule in enumerate(rules))
     else:
         dx = ufl.Measure("dx", mesh.mesh)
-        internal, full, nodal = (dx(metadata=rule) for rule in rules)
-    return vw.Measures(internal, full, nodal, full, ds(TOP), ds(BOTTOM))
+        internal, full, nodal, wall = (dx(metadata=rule) for rule in rules)
+    return vw.Measures(internal, full, nodal, wall, ds(TOP), ds(BOTTOM))
+
+
+@kernel(lean=True)
+def _hold(rows: npt.NDArray[np.int32], u: Array, out: Array, reaction: Array) -> None:
+    """Put u (n,) into some rows of out (n,), what stood there into reaction."""
+    for k in range(rows.size):
+        reaction[k] = out[rows[k]]
+        out[rows[k]] = u[rows[k]]
+
+
+@kernel()
+def rotations(q: Array) -> Array:
+    """Rotation matrices (n, 3, 3) of quaternions (n, 4) of any length (2-18)."""
+    R = np.empty((len(q), 3, 3))
+    for i in range(len(q)):
+        a, b, c, d = q[i]
+        n = a * a + b * b + c * c + d * d
+        R[i, 0] = (a * a + b * b - c * c - d * d) / n, 2 * (b * c - a * d) / n, 2 * (a * c + b * d) / n
+        R[i, 1] = 2 * (a * d + b * c) / n, (a * a - b * b + c * c - d * d) / n, 2 * (c * d - a * b) / n
+        R[i, 2] = 2 * (b * d - a * c) / n, 2 * (a * b + c * d) / n, (a * a - b * b - c * c + d * d) / n
+    return R
 
 
 @dataclass(frozen=True)
@@ -134,7 +163,7 @@ class Rod:
         self.scene = scene
         self.literal = scene.reading == "literal"
         self.model = scene.resolved_model()[0]
-        self.ansatz: Ansatz = ansatz(self.model, literal=self.literal)
+        self.ansatz: Ansatz = ansatz(self.model, literal=self.literal, depth=self._solves_depth())
         self.string = string_mesh(comm, [s.length for s in scene.string], scene.mesh.elements, scene.mesh.grading)
         self.mesh = self.string.mesh
         self.V = lagrange(self.mesh, scene.mesh.degree, self.ansatz.size)
@@ -145,7 +174,7 @@ class Rod:
         self._last = int(self.nodes[-1])
         self.arc_length: Array = s[self.nodes]
         self.length = float(sum(section.length for section in scene.string))
-        self.on = measures(self.string, scene.mesh.degree, scene.mesh.quadrature == "reduced")
+        self.on = measures(self.string, scene.mesh.degree, scene.mesh.quadrature == "reduced", self.wall_degree)
         self.section = Section(section_field(scene, self.string))
         self.s = ufl.SpatialCoordinate(self.mesh)[0]
         self.weight, self.torque = self.constant(0.0), self.constant(0.0)
@@ -162,6 +191,9 @@ class Rod:
         self.tip_force = self.constant(scene.ends.tip_force)
         self.tip_moment = self.constant(scene.ends.tip_moment)
         self.shift = self.constant(1.0)
+        law = law_of(scene)
+        #: the drive, where it is a torque that follows the top
+        self.drive = TopTorque(scene, law, self.constant) if law is not None else None
         self.loads = self._loads()
         self.terms = vw.dynamic_terms(
             self.ansatz,
@@ -175,9 +207,16 @@ class Rod:
             self.literal,
         )
         self.held, self.driven = self._conditions()
+        #: axial speed of the top of a string that no constant load holds (m/s), and its dof
+        self.block_speed = scene.top_drive.block_speed or 0.0
+        axial = self.dof(0, "v3") if "v3" in self.ansatz.v_names else None
+        self.lowered = axial if scene.ends.top == "driven" and axial in self.held else None
         self.constrained = np.array(sorted([*self.held, *self.driven]), dtype=np.int32)
+        #: the driven dof that turns about the string's axis, and the inertia lumped there
+        self.driven_spin = self.dof(0, "w3") if "w3" in self.ansatz.v_names else None
         #: raw residual at the constrained dofs: the reactions of the last evaluation
         self.reaction: Array = np.zeros(len(self.constrained))
+        self._work: Array = np.zeros(self.size)
 
     # -- what acts ---------------------------------------------------------------------------------------------------
 
@@ -187,7 +226,7 @@ class Rod:
 
     def _loads(self) -> vw.Loads:
         scene, ends, c = self.scene, self.scene.ends, self.constant
-        hook_load = scene.nominal().hook_load if scene.drills else 0.0
+        hook_load = scene.nominal().hook_load if scene.hangs else 0.0
         wall = None
         if self.wall is not None and scene.contact is not None:
             k = scene.contact
@@ -199,6 +238,7 @@ class Rod:
                 regularisation=c(k.friction_regularisation),
                 method=k.method,
                 projected=k.projected and not self.literal,
+                retardation=c(self.wall.retardation) if self.wall.retardation else None,
             )
         bit = None
         if self.has_bit:
@@ -213,6 +253,9 @@ class Rod:
             bit=bit,
             wall=wall,
             lump=self._lump(),
+            motor=self.drive.motor if self.drive is not None else None,
+            mud=self._mud(),
+            centreline=None if self.wall is None or self.wall.at_nodes is None else Hole(self.wall.at_nodes),
         )
 
     def _lump(self) -> vw.Lump | None:
@@ -223,21 +266,51 @@ class Rod:
         at_bit = vw.EndLoad(c((0.0, 0.0, 0.0)), c((0.0, 0.0, 0.0)), c(mass), c(inertia))
         return vw.Lump(c(alpha), at_bit)
 
+    def _mud(self) -> Mud | None:
+        mud = self.scene.mud
+        if mud is None:
+            return None
+        V = discontinuous(self.mesh, 0, len(MUD))
+        field = dolfinx.fem.Function(V)
+        cells = V.dofmap.list[self.string.cells.indices, 0]
+        middle = self.string.mesh.geometry.x[self.mesh.geometry.dofmap[self.string.cells.indices], 0].mean(axis=1)
+        field.x.array.reshape(-1, len(MUD))[cells] = mud_properties(self.scene, self.string.cells.values, middle)
+        return Mud(field, moves=mud.added_mass, drags=mud.viscosity > 0)
+
+    @property
+    def _touches(self) -> bool:
+        """Whether there is a wall, and the model knows where the string is in its hole."""
+        scene = self.scene
+        return scene.hole.kind != "none" and scene.contact is not None and self.model in ("spatial", "planar")
+
+    def _solves_depth(self) -> bool:
+        """Whether the measured depth of the closest point is an unknown (D-6)."""
+        contact = self.scene.contact
+        return self._touches and contact is not None and contact.closest_point == "field"
+
     def _wall(self) -> WallPoints | None:
         scene, hole, contact = self.scene, self.scene.borehole, self.scene.contact
-        if hole is None or contact is None or self.model not in ("spatial", "planar"):
+        if hole is None or contact is None or not self._touches:
             return None
         radius = section_table(scene)[:, SECTION.index("contact_radius")][self.string.cells.values]
         friction = np.array([contact.friction_static, contact.friction_dynamic])
         by_cell = np.empty_like(radius)
         by_cell[self.string.cells.indices] = radius
-        axes = (0, 1, 2) if self.model == "spatial" else (0, 2)
-        return WallPoints(self.V, hole, by_cell, friction, self.wall_degree, axes)
+        found = WallPoints(self.V, hole, by_cell, friction, self.wall_degree, self.ansatz)
+        if scene.time.analysis == "dynamic":
+            # multipliers that hold a point by its place alone throw it back with more than it brought
+            least = scene.time.step if contact.method == "augmented" else 0.0
+            found.retardation = max(contact.retardation_time, least)
+        return found
 
     @property
     def wall_degree(self) -> int:
-        """Degree of the rule that integrates contact."""
-        return 2 * self.scene.mesh.degree
+        """Degree of the rule that integrates contact: the fewest points that spread an even load as the fields do.
+
+        More of them hold a stiff wall at more points than the string has unknowns to follow: their forces zigzag (on
+        elements of 25 m and a penalty of 1e6 N/m2 by 15 %, with this rule by 1 %; docs/contact.md).
+        """
+        return self.scene.mesh.degree | 1
 
     @cached_property
     def bends(self) -> bool:
@@ -247,7 +320,7 @@ class Rod:
     @cached_property
     def has_bit(self) -> bool:
         """Whether rock loads the lower end."""
-        return self.scene.drills
+        return self.scene.bites
 
     def _stress_free_curvature(self) -> tuple[float, float, float]:
         reference = self.scene.reference
@@ -266,24 +339,28 @@ class Rod:
 
     def _conditions(self) -> tuple[list[int], dict[int, float]]:
         """Dofs held at zero speed, and driven ones with their share of the drive's speed (component of its axis)."""
-        ends, names = self.scene.ends, self.ansatz.v_names
+        scene, ends, names = self.scene, self.scene.ends, self.ansatz.v_names
         held: list[int] = []
         driven: dict[int, float] = {}
         for node, kind in ((0, ends.top), (-1, ends.bottom)):
             if kind == "driven":
                 # about a fixed axis that is also a material one, R(0) = 1 at the top
-                turning = {f"w{k + 1}": x for k, x in enumerate(self.scene.top_drive.axis) if x != 0.0}
-                driven |= {self.dof(node, n): x for n, x in turning.items() if n in names}
-                fixed = ["v1", "v2", "w1", "w2", "w3"] + ([] if self.has_bit else ["v3"])
+                turning = {f"w{k + 1}": x for k, x in enumerate(scene.top_drive.axis) if x != 0.0}
+                fixed = ["v1", "v2", "w1", "w2", "w3"] + ([] if scene.hangs else ["v3"])
                 held += [self.dof(node, n) for n in fixed if n in names and n not in turning]
+                if self.drive is None:
+                    driven |= {self.dof(node, n): x for n, x in turning.items() if n in names}
             elif not (kind == "bit" and self.bends):  # there the hole guides it
                 held += [self.dof(node, n) for n in _HELD[kind] if n in names]
         return held, driven
 
     @property
     def turns(self) -> bool:
-        """Whether the lower end has a spin of its own to follow: it drills, or hangs in a hole."""
-        return self.has_bit or (self.wall is not None and self.model == "spatial")
+        """Whether the lower end has a spin of its own to follow: it carries a bit, hangs in a hole, or is turned."""
+        drive = self.scene.top_drive
+        able = "r3" in self.ansatz.x_names and "w3" in self.ansatz.v_names
+        turned = drive.kind != "none" and drive.axis == E3
+        return able and (turned or self.scene.bit is not None or self.wall is not None)
 
     def end_motion(self, u: Array) -> tuple[float, float, float]:
         """Measured depth (m), speed along the hole (m/s) and spin (rad/s) of the lower end in a state.
@@ -360,16 +437,28 @@ class Rod:
     def residual(self, t: float, u: Array, u_dot: Array, out: Array) -> None:
         """F(t, u, u-dot), shape (dofs,); end conditions replace the momentum rows of their dofs."""
         self.set_state(u, u_dot)
-        (self._residual if self._near_wall() else self._residual_off_wall)(out)
+        if self.drive is not None:
+            self.drive.at(t)
+        self._present_residual(out)
         if self.wall is not None and self.wall.trouble:
             out[:] = np.nan  # no step ends here
-        rows = self.constrained
-        self.reaction[:] = out[rows]
-        out[rows] = u[rows]
+        _hold(self.constrained, u, out, self.reaction)
+        if self.lowered is not None:
+            out[self.lowered] -= self.block_speed
         if self.driven:
             _, speed, _ = self.scene.top_drive.motion(t)
             for row, share in self.driven.items():
                 out[row] -= share * speed
+
+    @property
+    def _present_residual(self) -> VectorForm:
+        return self._residual if self._near_wall() else self._residual_off_wall
+
+    def observe(self, u: Array, u_dot: Array) -> None:
+        """Take a state and its reactions, as :meth:`residual` does, without the residual."""
+        self.set_state(u, u_dot)
+        self._present_residual.at_ends(self._work)
+        self.reaction[:] = self._work[self.constrained]
 
     def jacobian(self, u: Array, u_dot: Array, shift: float, matrix: PETSc.Mat) -> None:
         """dF/du + shift dF/du-dot at a state, with unit rows at the end conditions."""
@@ -383,11 +472,14 @@ class Rod:
         return self.vector_form(self.terms["bit"])
 
     def bit_load_vectors(self) -> Array:
-        """dF/d(weight) and dF/d(torque) at the present state, shape (2, dofs): the bit's term is linear in its load."""
+        """dF/d(weight) and dF/d(torque) at the present state, shape (2, dofs): the bit's term is linear in its load,
+        but for the force that guides it."""
         load, vectors = self.bit_load.copy(), np.zeros((2, self.size))
         for unit, vector in zip(np.eye(2), vectors, strict=True):
             self.set_bit_load(*unit)
             self._bit_term(vector)
+        self.set_bit_load(0.0, 0.0)
+        vectors -= self._bit_term(np.zeros(self.size))
         self.set_bit_load(*load)
         vectors[:, self.constrained] = 0.0
         return vectors
@@ -406,14 +498,56 @@ class Rod:
         """Number of scalar unknowns."""
         return len(self.u.x.array)
 
-    def top_torque(self) -> float:
-        """Torque of the drive on the string (N m) at the last residual."""
-        rows = self.constrained
-        return float(sum(x * self.reaction[np.searchsorted(rows, dof)] for dof, x in self.driven.items()))
+    def _reaction(self, dof: int) -> float:
+        """Reaction at a constrained dof (N or N m) at the last residual."""
+        return float(self.reaction[np.searchsorted(self.constrained, dof)])
+
+    def top_torque(self, t: float) -> float:
+        """Torque (N m) that an imposed motion of the top takes at time t (s), at the last residual.
+
+        The rate of an integrator is a mean, and that of the trapezoidal rule is none at all: what is lumped at the top
+        takes the acceleration that is imposed on it.
+        """
+        inertia, acceleration = self.scene.ends.top_inertia, self.scene.top_drive.motion(t)[2]
+        torque = 0.0
+        for dof, x in self.driven.items():
+            torque += x * self._reaction(dof)
+            if dof == self.driven_spin:
+                torque += inertia * x * (x * acceleration - float(self._u_dot[dof]))
+        return torque
+
+    def hook_load(self) -> float:
+        """Load on the hook (N, up): the constant one, or what holds the top at the last residual."""
+        if self.lowered is not None and self.scene.top_drive.axis == E3:
+            return -self._reaction(self.lowered)
+        return -float(self.loads.top.force.value[2])
+
+    def top_motion(self, u: Array) -> tuple[Array, float]:
+        """Rotation (3, 3) and spin (rad/s) of the top in a state."""
+        node = u.reshape(-1, self.ansatz.size)[self.nodes[:1]]
+        return self._rotations(node)[0], float(node[0, self.ansatz.index("w3")])
+
+    def begin(self, u: Array, share: float = 1.0) -> None:
+        """A run starts here; ``share`` of the end of a step in its mean, of integrators that take one of start and end.
+
+        A drive in steady drilling carries its torque from the start: the bit's.
+        """
+        if self.drive is None:
+            return
+        steady = self.has_bit and self.scene.initial.state == "nominal"
+        self.drive.share = share
+        self.drive.begin(*self.top_motion(u), self.scene.nominal().torque_on_bit if steady else None)
+
+    def accept(self, t: float, u: Array) -> None:
+        """A step has ended at time t (s) in the state u."""
+        if self.drive is not None:
+            self.drive.accept(t, *self.top_motion(u))
 
     def end_power(self) -> float:
         """Power (W) that the hook load and the loads at the tip put into the string at the present state."""
         total = 0.0
+        if self.lowered is not None and self.block_speed:
+            total += self._reaction(self.lowered) * self.block_speed
         for force, dof in self._end_forces:
             total += force * self._u[dof]
         if np.any(self.tip_moment.value):
@@ -437,24 +571,62 @@ class Rod:
     @cached_property
     def _powers(self) -> dict[str, ScalarForm]:
         terms = vw.powers(self.ansatz, self.u, self.u_dot, self.s, self.section, self.loads, self.on, self.literal)
-        power = {"damping": self.scalar_form(terms["damping"])}
+        lost = terms["damping"] + terms["mud drag"] if "mud drag" in terms else terms["damping"]
+        power = {"damping": self.scalar_form(lost)}
         if self.loads.wall is not None:
-            power["wall"] = self.scalar_form(terms["contact"] + terms["friction"])
+            power |= {name: self.scalar_form(terms[name]) for name in ("contact", "friction")}
         return power
 
     def gravity_vector(self) -> Array:
-        """Virtual work of gravity in every dof (dofs,), on the left-hand side: minus the nodal weights."""
-        return self.vector_form(self.terms["gravity"])(np.zeros(self.size))
+        """Virtual work of gravity and buoyancy in every dof (dofs,), on the left-hand side: minus the nodal weights."""
+        weight = vw.total({k: v for k, v in self.terms.items() if k in ("gravity", "buoyancy")})
+        out: Array = np.zeros(self.size)
+        moves = any(name.startswith("v") for name in self.ansatz.v_names)
+        return self.vector_form(weight)(out) if moves else out
 
     @cached_property
     def _weight_vector(self) -> Array:
         return self.gravity_vector()
 
     def powers(self) -> dict[str, float]:
-        """Power (W) of damping, gravity and wall at the present state; positive takes energy from the string."""
-        power = {name: form() for name, form in self._powers.items() if name != "wall" or self._near_wall()}
+        """Power (W) of damping (also of mud), gravity, contact and friction at the present state; positive takes energy
+        from the string. Contact and friction are left out where the string is off the wall."""
+        near = self._near_wall()
+        power = {name: form() for name, form in self._powers.items() if name == "damping" or near}
         power["gravity"] = float(self._weight_vector @ self._u)
         return power
+
+    def augment(self, shift: float) -> bool:
+        """Move the multipliers of the augmented Lagrangian to the present state; False where they may stay.
+
+        shift: d(u-dot)/du of a time step (1/s): a correction of the string's place must also overcome its inertia, and
+        the multipliers may move by as much more.
+        """
+        wall, contact = self.wall, self.scene.contact
+        if wall is None or contact is None or contact.method != "augmented":
+            return False
+        inertia = shift**2 / (1 + wall.retardation * shift) * self._mass_at_wall
+        limit = contact.penetration_tolerance
+        return wall.augment(self._u, contact.stiffness, limit, inertia) > limit
+
+    def there(self) -> tuple[Array, Array, float] | None:
+        """Where the hole was found last, and how the wall's multipliers stood: for :meth:`go_back`."""
+        wall = self.wall
+        return None if wall is None else (wall.p.copy(), wall.multipliers.copy(), self.bit_measured_depth)
+
+    def go_back(self, there: tuple[Array, Array, float] | None) -> None:
+        """Take the hole up again where it was found then."""
+        if self.wall is not None and there is not None:
+            p, self.wall.multipliers[:], self.bit_measured_depth = there
+            self.wall.go_to(p)
+
+    @cached_property
+    def _mass_at_wall(self) -> Array:
+        """Mass per length (points,; kg/m) at the points of the wall."""
+        assert self.wall is not None
+        V = self.section.field.function_space
+        mass = self.section.field.x.array.reshape(-1, len(SECTION))[V.dofmap.list[:, 0], SECTION.index("mass")]
+        return np.repeat(mass, len(self.wall.basis))
 
     def _near_wall(self) -> bool:
         """Whether the wall may act on any point of the present state (also where one has lost the hole)."""
@@ -462,6 +634,9 @@ class Rod:
         if wall is None or contact is None:
             return False
         reach = contact.smoothing if contact.method == "smooth" else 0.0
+        if wall.retardation:
+            at = self.ansatz.index("v1")
+            reach += wall.retardation * float(np.abs(self._u.reshape(-1, self.ansatz.size)[:, at : at + 3]).max()) * 2
         return not wall.gap > reach or (contact.method == "augmented" and bool(wall.multipliers.any()))
 
     @cached_property
@@ -476,6 +651,20 @@ class Rod:
     def energies(self) -> tuple[float, float]:
         """Kinetic and strain energy (J) of the present state."""
         return self._kinetic(), self._strain()
+
+    @cached_property
+    def _contact_energy(self) -> ScalarForm:
+        assert self.loads.wall is not None
+        x, _ = self.ansatz.split(self.u)
+        at = self.ansatz.configuration(x, self.s)
+        return self.scalar_form(wall_energy(at, self.section["contact_radius"], self.loads.wall) * self.on.wall)
+
+    def contact_energy(self) -> float:
+        """Energy (J) stored in the contact of the present state: what its normal force gives back. 0 of an augmented
+        Lagrangian, which lets nothing through."""
+        contact = self.scene.contact
+        stores = contact is not None and contact.method != "augmented"
+        return self._contact_energy() if stores and self._near_wall() else 0.0
 
     @cached_property
     def _wall_torque(self) -> ScalarForm:
@@ -536,22 +725,19 @@ class Rod:
         get = {name: block[:, i] for i, name in enumerate(self.ansatz.x_names)}
         zero = np.zeros(len(block))
         r = np.stack([get.get("r1", zero), get.get("r2", zero), get.get("r3", self.arc_length)], axis=1)
+        return r, self._rotations(block)
+
+    def _rotations(self, block: Array) -> Array:
+        """Rotation matrices (nodes, 3, 3) of nodes with these unknowns (nodes, fields)."""
+        names, half = self.ansatz.x_names, np.zeros((len(block), 4))
         if isinstance(self.ansatz, Spatial):
-            a, b, c, d = (get[f"q_{k}"] for k in "abcd")
-        elif "theta" in get:
-            a, b, c, d = np.cos(get["theta"] / 2), zero, np.sin(get["theta"] / 2), zero
+            first = names.index("q_a")
+            half[:] = block[:, first : first + 4]
         else:
-            a, b, c, d = np.cos(get["phi"] / 2), zero, zero, np.sin(get["phi"] / 2)
-        n = a * a + b * b + c * c + d * d
-        R = np.stack(
-            [
-                np.stack([a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (a * c + b * d)], axis=1),
-                np.stack([2 * (a * d + b * c), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)], axis=1),
-                np.stack([2 * (b * d - a * c), 2 * (a * b + c * d), a * a - b * b - c * c + d * d], axis=1),
-            ],
-            axis=1,
-        )
-        return r, R / n[:, None, None]
+            name, axis = ("theta", 2) if "theta" in names else ("phi", 3)
+            angle = block[:, names.index(name)] / 2
+            half[:, 0], half[:, axis] = np.cos(angle), np.sin(angle)
+        return rotations(half)
 
     def fields(self) -> dict[str, Array]:
         """What a picture needs, per node from the top down: position, directors, speeds, resultants, diameters."""
@@ -565,6 +751,7 @@ class Rod:
             "director1": R[:, :, 0],
             "director3": R[:, :, 2],
             "axial_force": n[:, 2],
+            "shear_force": np.hypot(n[:, 0], n[:, 1]),
             "torque": m[:, 2],
             "bending_moment": np.hypot(m[:, 0], m[:, 1]),
         }

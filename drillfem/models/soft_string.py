@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from ..scene.mud import turning_drag
 
 if TYPE_CHECKING:
     from ..boreholes import Borehole
@@ -148,11 +149,9 @@ def line_of(scene: Scene) -> Line:
         raise SceneError("hole.kind = 'none': must be a hole, with [contact], for a string that lies in it")
     if why := hole.outside(0.0, scene.length):
         raise SceneError(f"string: must fit the hole: {why}")
-    g = scene.gravity.magnitude
-    density = scene.mud.density if scene.mud is not None else 0.0
     pieces = Pieces(
         np.array([s.length for s in scene.string]),
-        g * np.array([s.mass_per_length - density * s.area for s in scene.string]),
+        np.array([scene.weight_per_length(s) for s in scene.string]),
         np.array([s.contact_radius for s in scene.string]),
         np.array([s.section_stiffness().bending1 for s in scene.string]),
     )
@@ -162,7 +161,7 @@ def line_of(scene: Scene) -> Line:
         pieces,
         (contact.friction_static, contact.friction_dynamic),
         (north, east, down),
-        g * scene.ends.bottom_mass,
+        scene.gravity.magnitude * scene.ends.bottom_mass,
     )
 
 
@@ -206,11 +205,9 @@ def wall_friction(scene: Scene) -> WallFriction:
     viscosity = scene.mud.viscosity if scene.mud is not None else 0.0
 
     def drag(s: F8) -> F8:
-        # laminar flow between concentric cylinders, the inner one turning (Couette)
-        here = line.at(s)
-        outer = here.radius + here.clearance
-        inner = np.array([x.outer_radius for x in scene.string])[line.piece(s)]
-        return 4 * np.pi * viscosity / (1 / inner**2 - 1 / outer**2)
+        radius = [scene.string[i].outer_radius for i in line.piece(s)]
+        hole = line.hole.frame(s).radius
+        return np.array([turning_drag(viscosity, r, h) for r, h in zip(radius, hole, strict=True)])
 
     return WallFriction(
         torque,

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from ..meshes.points import distribute, nodes
 from ..scene import Scene
 from ..scene.nominal import lumped_at_bit, lumps
-from .steady import outer_diameter, spin_perturbation, stretch_and_twist
+from .steady import outer_diameter, start_of_drilling, stretch_and_twist
 
 F8 = npt.NDArray[np.float64]
 
@@ -205,8 +205,7 @@ class StraightString:
             twist = np.zeros_like(twist)
         speed, spin = np.zeros_like(displacement), np.zeros_like(twist)
         if scene.initial.state != "rest":
-            speed[:] = nominal.rate_of_penetration
-            spin = (scene.top_drive.speed or 0.0) + spin_perturbation(scene) * s / scene.length
+            speed[:], spin = start_of_drilling(scene, s)
         return displacement, speed, twist, spin
 
     def fields(self, displacement: F8, axial_speed: F8, angle: F8, angular_speed: F8) -> dict[str, F8]:

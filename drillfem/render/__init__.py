@@ -17,7 +17,7 @@ __all__ = ["render_all", "render_result"]
 
 def render_all(
     folder: str | Path,
-    time: float | None = None,
+    time: float | Sequence[float] | None = None,
     field: str | None = None,
     film: bool = False,
     windows: Sequence[tuple[float, float]] | None = None,
@@ -26,14 +26,16 @@ def render_all(
 
     Args:
         folder: a result folder.
-        time: which moment to show, s; the saved pose next to it is taken, the last one by default.
+        time: which moment to show, s; the saved pose next to it is taken, the last one by default. Several: pictures
+            of a well compare them, the others show the last of them.
         field: scalar field that colours the string; the most telling one by default.
         film: make string.gif as well.
         windows: times (s) between which spectra are taken; `drillfem.results.windows` by default.
 
     Returns:
         The files written: time-series.png, spectra.png, space-time.png, rock.png (those that apply),
-        string.png, string-true.png, and string.gif.
+        string.png, string-true.png, and string.gif. For a string in a curved hole, in the place of string-true.png:
+        well.png, clearance.png, along.png, directors.png.
 
     Raises:
         SceneError: no result there, an unknown field, or a time or window outside the run.
@@ -47,7 +49,7 @@ def render_all(
 def render_result(
     result: Any,
     pictures: Path,
-    time: float | None = None,
+    time: float | Sequence[float] | None = None,
     field: str | None = None,
     film: bool = False,
     windows: Sequence[tuple[float, float]] | None = None,
@@ -61,9 +63,11 @@ def render_result(
     if story.fields is None:
         if field is not None or time is not None or film:
             raise SceneError("this result has no saved fields, so there is no string to show or film")
-        index, chosen = -1, None
+        index, chosen, shown = -1, None, []
     else:
-        index, chosen = story.choose_time(time), story.choose_field(field)
+        asked = [float(t) for t in time] if isinstance(time, Sequence) else [time]
+        shown = [story.choose_time(t) for t in asked]
+        index, chosen = shown[-1], story.choose_field(field)
         if film and len(story.times) < charts.MIN_POSES:
             raise SceneError(
                 f"only {len(story.times)} poses were saved, too few for a film: run with a shorter "
@@ -80,7 +84,9 @@ def render_result(
     if story.fields is not None:
         made.append(charts.space_time(story, pictures / "space-time.png"))
         made.append(charts.rock(story, index, pictures / "rock.png"))
-    for name in ("spectra.png", "space-time.png", "rock.png"):
+    if story.in_well:
+        made += _well(story, chosen, shown, pictures)
+    for name in ("spectra.png", "space-time.png", "rock.png", "clearance.png", "string-true.png"):
         if pictures / name not in made:  # of an earlier, longer or finer run in this folder
             (pictures / name).unlink(missing_ok=True)
     if story.fields is not None:
@@ -88,14 +94,30 @@ def render_result(
     return [path for path in made if path is not None]
 
 
+def _well(story: Any, field: str | None, shown: list[int], pictures: Path) -> list[Path | None]:
+    from drillfem.render import well_charts
+
+    index = shown[-1]
+    if len(shown) == 1 and len(story.times) > 2:  # how it came there, from soon after the start
+        shown = sorted({round(0.1 * index), index // 2, index})
+    return [
+        well_charts.plan_page(story, field, index, pictures / "well.png"),
+        well_charts.clearance_page(story, field, index, pictures / "clearance.png"),
+        well_charts.along_page(story, shown, pictures / "along.png"),
+        well_charts.directors_page(story, shown, pictures / "directors.png"),
+    ]
+
+
 def _string(story: Any, field: str | None, index: int, pictures: Path, film: bool) -> list[Path | None]:
-    from drillfem.render import poses, straight
+    from drillfem.render import poses, straight, well_view
     from drillfem.render.film import film as make_film
     from drillfem.render.studio import Studio
 
     made: list[Path | None] = []
     with Studio() as studio:
-        if story.sideways:
+        if story.in_well:
+            made.append(well_view.well_page(studio, story, field, index, pictures / "string.png"))
+        elif story.sideways:
             made.append(poses.poses_page(studio, story, field, index, pictures / "string.png"))
             made.append(poses.true_poses_page(studio, story, field, index, pictures / "string-true.png"))
         else:

@@ -11,7 +11,7 @@ import numpy as np
 
 from drillfem.errors import SceneError
 from drillfem.render import style
-from drillfem.render.story import Story, attribute
+from drillfem.render.story import SHOWN, Story, attribute
 from drillfem.render.straight import depth_ticks, marks, rpm, subtitle
 from drillfem.results.spectra import Peak, Window, dominant_in, spectra_in, windows
 
@@ -63,6 +63,27 @@ ROWS: tuple[Row, ...] = (
 )
 
 
+#: of a string in a well, besides those of its bit
+IN_WELL: tuple[Row, ...] = (
+    ("top_torque", "torque of\nthe drive", 1e-3, "kN m", style.ORANGE),
+    ("wall_torque", "friction\ntorque", 1e-3, "kN m", style.ORANGE),
+    ("hook_load", "hook load", 1e-3, "kN", style.ORANGE),
+    ("side_force", "side force\nof all", 1e-3, "kN", style.PURPLE),
+    ("penetration", "into the wall", 1e3, "mm", style.PURPLE),
+)
+
+
+def rows_of(story: Story) -> list[Row]:
+    """What to show of a history."""
+    rows = [row for row in ROWS if row[0] in story.history]
+    if story.in_well:
+        spin = ("bit_angular_speed", "bit spin", 30 / math.pi, "rpm", style.BLUE)
+        rows = [spin if row[0] == spin[0] else row for row in rows]
+        there = [row for row in IN_WELL if row[0] in story.history]
+        rows += [row for row in there if np.ptp(story.history[row[0]].values) > 0]
+    return rows or other_rows(story)
+
+
 def other_rows(story: Story) -> list[Row]:
     """What changes in the history of a run without a bit: the tip first, at most six; energies come by themselves."""
     names = [
@@ -79,15 +100,13 @@ def time_series(story: Story, path: Path) -> Path:
     """time-series.png: what happened at the bit and to the energy, the whole run and its last seconds."""
     history = story.history
     time = np.asarray(history["time"].values, dtype=float)
-    rows = [row for row in ROWS if row[0] in history]
-    if not rows:
-        rows = other_rows(story)
+    rows = rows_of(story)
     energies = [str(n) for n, v in history.items() if str(n).endswith("_energy") and v.dims == ("time",)]
     count, columns = len(rows) + bool(energies), 2 if story.drilling else 1
     limit = float(attribute(story.scene, "bit", "torsional_regularisation", default=0.1))
     start, stop = zoom_window(time)
     near = (time >= start) & (time <= stop)
-    with style.page(1600, 1400 if count > 5 else max(500, 230 * count + 190)) as figure:
+    with style.page(1600, max(1400, 125 * count + 190) if count > 5 else max(500, 230 * count + 190)) as figure:
         style.heading(figure, story.title, subtitle_of_history(story, time))
         height = figure.get_size_inches()[1] * style.DPI
         top, bottom = 1 - 125 / height, 66 / height
@@ -110,7 +129,8 @@ def time_series(story: Story, path: Path) -> Path:
                 axes.set_title(f"Its last {style.number(stop - start)} s" if column else "The whole run")
             if k < len(rows):
                 if rows[k][0] == "bit_angular_speed" and story.nominal.speed:
-                    shade_stick(axes, time, np.asarray(history["bit_angular_speed"].values), limit, column == 1)
+                    spin = np.asarray(history["bit_angular_speed"].values)
+                    shade_stick(axes, time, spin, limit, column == 1, rows[k][2])
                 draw_row(axes, story, rows[k], time, window)
             else:
                 draw_energies(axes, story, energies, time, window)
@@ -129,6 +149,8 @@ def time_series(story: Story, path: Path) -> Path:
                 axes.set_ylabel("")
         figure.align_ylabels(axes_left)
         said = ["Dashed: the nominal steady state."] if story.nominal.depth_of_cut is not None else []
+        if story.in_well and "top_angular_speed" in history:
+            said.append("Grey, above: the top." if said else "Grey, above: the top; dashed: what it shall reach.")
         if story.nominal.speed and "bit_angular_speed" in history:
             share = stick_share(time, np.asarray(history["bit_angular_speed"].values), limit)
             said.append(f"Orange: the bit sticks (below {limit:g} rad/s), {100 * share:.1f} % of the run.")
@@ -140,6 +162,9 @@ def draw_row(axes: Axes, story: Story, row: Row, time: np.ndarray, window: np.nd
     """One variable over a window of time, with its nominal level."""
     name, words, factor, unit, colour = row
     t = time[window]
+    if story.in_well and name == "bit_angular_speed" and "top_angular_speed" in story.history:
+        top = factor * np.asarray(story.history["top_angular_speed"].values, dtype=float)
+        axes.plot(t, top[window], color=style.GREY, lw=1.1)
     curve(axes, t, factor * np.asarray(story.history[name].values, dtype=float)[window], colour)
     nominal = story.nominal
     level = {
@@ -179,12 +204,13 @@ def stick_share(time: np.ndarray, spin: np.ndarray, limit: float) -> float:
     return sum(b - a for a, b in stuck(time, spin, limit)) / max(float(time[-1] - time[0]), 1e-12)
 
 
-def shade_stick(axes: Axes, time: np.ndarray, spin: np.ndarray, limit: float, near: bool) -> None:
-    """Orange where the bit stands: intervals in time, and in the overview a band in speed as well."""
+def shade_stick(axes: Axes, time: np.ndarray, spin: np.ndarray, limit: float, near: bool, factor: float = 1.0) -> None:
+    """Orange where the bit stands: intervals in time, and in the overview a band in speed as well (shown per rad/s:
+    factor)."""
     for a, b in stuck(time, spin, limit):
         if near or len(time) < 20000:
             axes.axvspan(a, b, color=style.ORANGE, alpha=0.28, lw=0)
-    axes.axhspan(-limit, limit, color=style.ORANGE, alpha=0.55, lw=0, zorder=2.5)
+    axes.axhspan(-factor * limit, factor * limit, color=style.ORANGE, alpha=0.55, lw=0, zorder=2.5)
 
 
 # -- spectra ---------------------------------------------------------------------------------------------
@@ -247,7 +273,7 @@ def spectra(story: Story, path: Path, chosen: Sequence[tuple[float, float]] | No
                 if row == len(rows) - 1:
                     axes.set_xlabel("frequency (Hz)")
         said = "Thick: Hann window, zero padded. Thin: 2|X|/N without window. Dots: waves, frequency and amplitude."
-        if story.natural_frequencies:
+        if story.natural_frequencies and not story.in_well:
             said += " Above: natural frequencies."
         figure.text(0.985, 1 - 62 / height, said, ha="right", fontsize=10.5, color=style.GREY)
         return style.save(figure, path)
@@ -269,7 +295,8 @@ def natural_marks(axes: Axes, story: Story, own: str) -> None:
     level = 0
     for kind, colour in KINDS.items():
         found = [f for f in story.natural_frequencies.get(kind, []) if f <= top]
-        if not found:
+        # those of a string that hangs free say nothing of one that lies in its hole
+        if not found or (story.in_well and kind == "coupled"):
             continue
         low = 1.01 + 0.058 * level
         level += 1
@@ -365,22 +392,26 @@ def space_time(story: Story, path: Path) -> Path | None:
     """
     if story.fields is None or len(story.times) < MIN_POSES or story.still:
         return None
+    speeds = dict(zip(("spin", "axial_speed"), wave_speeds(story), strict=True))
+    fastest = speeds.get("spin")
+    part = slice(0, len(story.times)) if story.in_well else finest_window(story.times, 3.0)
+    coarse = float(np.median(np.diff(story.times[part])))
     wanted: tuple[str, ...] = ("spin", "axial_speed")
     names = [n for n in wanted if n in story.colour_fields]
-    if story.sideways or not names:
+    if story.in_well:
+        slow = fastest is not None and coarse > story.length / fastest  # waves come and go unseen
+        names = ["side_force", "bending_moment"] if slow else ["spin", "torque", "side_force"]
+        names = [n for n in names if n in story.colour_fields]
+    elif story.sideways or not names:
         wanted = ("spin", "bending_moment", "curvature", "axial_force")
         names = [n for n in wanted if n in story.colour_fields][:2]
     if not names:
         return None
-    part = finest_window(story.times, 3.0)
     times = story.times[part]
     arc = story.arc - story.arc[0]
-    speeds = dict(zip(("spin", "axial_speed"), wave_speeds(story), strict=True))
-    coarse = float(np.median(np.diff(times)))
-    fastest = speeds.get("spin")
-    if not story.sideways and fastest and coarse > 0.25 * story.length / fastest:
+    if not (story.in_well or story.sideways) and fastest and coarse > 0.25 * story.length / fastest:
         return None
-    with style.page(1600, 1200 if len(names) > 1 else 900) as figure:
+    with style.page(1600, (900, 1200, 1500)[len(names) - 1]) as figure:
         height = figure.get_size_inches()[1] * style.DPI
         note = f"one pose every {style.number(coarse)} s"
         style.heading(
@@ -403,6 +434,8 @@ def space_time(story: Story, path: Path) -> Path | None:
             axes = figure.add_subplot(grid[row, 0])
             values = story.values(name)[part]
             factor, label = (1e3, "axial speed (mm/s)") if name == "axial_speed" else (1.0, story.label(name))
+            if story.in_well:
+                factor, label = SHOWN.get(name, (factor, label))
             values = factor * values
             middle = {"spin": story.nominal.speed, "axial_speed": story.nominal.penetration}.get(name)
             if middle is not None:  # two-sided colours: slower and faster than nominal differ in hue
@@ -410,6 +443,9 @@ def space_time(story: Story, path: Path) -> Path | None:
                 low, high = style.band(values)
                 reach = max(middle - low, high - middle, 1e-9)
                 limits, colours = (middle - reach, middle + reach), "PuOr_r"
+            elif name == "side_force":  # a few stabilisers would hide all the rest
+                pressing = values[values > 0]
+                limits, colours = (0.0, float(np.percentile(pressing, 98)) if pressing.size else 1.0), "YlOrRd"
             else:
                 limits, colours = style.band(values), "cividis"
             image = axes.imshow(
@@ -428,6 +464,8 @@ def space_time(story: Story, path: Path) -> Path | None:
             axes.set_title(f"{name.replace('_', ' ').capitalize()}")
             marks(axes, story, arc)
             for section in story.parts if len(story.parts) > 1 else ():
+                if section.bottom - section.top < 0.07 * story.length:
+                    continue
                 axes.text(
                     times[0] + 0.006 * (times[-1] - times[0]),
                     section.top - story.arc[0] + 0.012 * story.length,
@@ -445,7 +483,8 @@ def space_time(story: Story, path: Path) -> Path | None:
             bar.outline.set_visible(False)
             if middle is not None:
                 bar.ax.axhline(middle, color=style.INK, lw=1.2)
-                bar.ax.set_title(f"nominal\n{style.number(middle, 4)}", fontsize=9, weight="normal", loc="center")
+                words = "drive" if story.in_well else "nominal"
+                bar.ax.set_title(f"{words}\n{style.number(middle, 4)}", fontsize=9, weight="normal", loc="center")
             if row == len(names) - 1:
                 axes.set_xlabel("time (s)")
         return style.save(figure, path)

@@ -16,8 +16,18 @@ if TYPE_CHECKING:
 
 # the field a viewer wants to see first, if it is there
 FIRST_CHOICE = ("spin", "axial_force", "torque", "bending_moment", "curvature", "axial_speed")
+# what is saved at the points that may touch the wall, and is shown along the string under a name of its own
+AT_WALL = {"side_force": "wall_side_force", "gap": "wall_gap"}
 # names that a result may use for the same thing
 ALIASES = {"arc_length": ("s",), "position": ("r",), "director1": ("d1",), "director3": ("d3",)}
+# factor and label of fields of a string in a well; its torque is that handed down, positive when drilling
+SHOWN = {
+    "spin": (30 / math.pi, "spin (rpm)"),
+    "torque": (-1e-3, "torque (kN m)"),
+    "axial_force": (1e-3, "tension (kN)"),
+    "side_force": (1e-3, "side force (kN/m)"),
+    "bending_moment": (1e-3, "bending moment (kN m)"),
+}
 NOT_COLOURS = {"arc_length", "outer_diameter", "inner_diameter"}
 LATERAL = 0.02  # of the length: a string that leaves its line by more is shown by its true shape
 
@@ -102,6 +112,14 @@ class Story:
             self.length = float(self.arc[-1] - self.arc[0])
             self.parts = self._parts()
             self.sideways = self._sideways()
+            self._along_wall: dict[str, np.ndarray] = {}
+
+    @property
+    def in_well(self) -> bool:
+        """Whether the string lies in a hole that leaves the vertical."""
+        if self.fields is None or not attribute(self.scene, "hole", "bends", default=False):
+            return False
+        return "wall_depth" in self.fields and attribute(self.scene, "borehole") is not None
 
     # -- what the scene says -----------------------------------------------------------------------------
     def _nominal(self) -> Nominal:
@@ -174,7 +192,7 @@ class Story:
         names = [
             str(n) for n, v in self.fields.data_vars.items() if v.dims == ("time", "node") and n not in NOT_COLOURS
         ]
-        return sorted(names)
+        return sorted([*names, *(n for n, saved in AT_WALL.items() if saved in self.fields)])
 
     def choose_field(self, wanted: str | None) -> str | None:
         """The wanted field, or the first that says something; SceneError that lists what is there."""
@@ -188,6 +206,7 @@ class Story:
         telling = [n for n in usable if np.ptp(self.values(n)) > 1e-9 * (1 + np.abs(self.values(n)).max())]
         bent = ("bending_moment", "curvature")
         choice = (*bent, *FIRST_CHOICE) if self.sideways else FIRST_CHOICE
+        choice = ("side_force", *choice) if self.in_well else choice
         for pool in (telling, usable):
             for name in choice:
                 if name in pool:
@@ -214,12 +233,24 @@ class Story:
     def values(self, name: str) -> np.ndarray:
         """A scalar field, (time, node)."""
         assert self.fields is not None
+        if name in AT_WALL and name not in self.fields:
+            if name not in self._along_wall:
+                at, values = self.at_wall("wall_arc_length"), self.at_wall(AT_WALL[name])
+                rows = [np.interp(self.arc, s, row) for s, row in zip(at, values, strict=True)]
+                self._along_wall[name] = np.array(rows)
+            return self._along_wall[name]
+        return np.asarray(self.fields[name].values, dtype=float)
+
+    def at_wall(self, name: str) -> np.ndarray:
+        """A field of the points that may touch the wall, (time, wall), from the top down."""
+        assert self.fields is not None
         return np.asarray(self.fields[name].values, dtype=float)
 
     def units(self, name: str) -> str:
         """The field's units as saved."""
         assert self.fields is not None
-        return str(self.fields[name].attrs.get("units", ""))
+        saved = name if name in self.fields else AT_WALL[name]
+        return str(self.fields[saved].attrs.get("units", ""))
 
     def label(self, name: str) -> str:
         """'axial force (N)': a name with its units, for an axis."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from drillfem.errors import DrillfemError, SceneError
 from drillfem.scene import Scene, load_scene
 
-from . import chapter5, chapter6
+from . import appendix_b, chapter4, chapter5, chapter6
 from .claims import Case, Claim, Experiment, Run, Value, Variation
 from .imitation import Numerics, imitate
 from .signals import Signals
@@ -20,7 +20,7 @@ from .signals import Signals
 if TYPE_CHECKING:
     import xarray as xr
 
-CASES: tuple[Case, ...] = (*chapter5.CASES, *chapter6.CASES)
+CASES: tuple[Case, ...] = (*chapter4.CASES, *chapter5.CASES, *chapter6.CASES, *appendix_b.CASES)
 """All cases, in the order of the thesis."""
 
 IMITATION = Numerics()
@@ -119,18 +119,19 @@ class Studio:
             start = time.perf_counter()
             out = self.out / folder if self.out and variation is None else None
             # a variation is made to be wrong; a scene as shipped may well be warned about
-            history = self._history(scene, v, until, out, warn=variation is None)
-            self._done[key] = Signals.of(scene, history, time.perf_counter() - start)
+            history, fields = self._run(scene, v, until, out, warn=variation is None)
+            self._done[key] = Signals.of(scene, history, time.perf_counter() - start, fields)
         return self._done[key].read_as(v.reading)
 
-    def _history(
+    def _run(
         self, scene: Scene, variation: Variation, until: float | None, out: Path | None, warn: bool
-    ) -> xr.Dataset:
+    ) -> tuple[xr.Dataset, xr.Dataset | None]:
         if variation.numerics is not None:
-            return imitate(scene, variation.numerics, until)
+            return imitate(scene, variation.numerics, until), None
         from drillfem.solve import simulate
 
-        return simulate(scene, out=out, until=until, warn=warn).history
+        result = simulate(scene, out=out, until=until, warn=warn)
+        return result.history, result.fields
 
 
 class Family:
@@ -191,9 +192,11 @@ def compare(case: Case, studio: Studio, imitated: bool = False, brief: bool = Fa
     start = time.perf_counter()
     shipped = Family(case, studio)
     # the runs of 1000 s would take a minute and tell nothing that the others do not
-    short = tuple(name for name, run in case.runs.items() if (run.until or 0.0) < 500.0)
+    short = tuple(
+        name for name, run in case.runs.items() if (run.until or 0.0) < 500.0 and shipped.scene(name).condensable
+    )
     imitation = Variation("imitated", _thesis_mesh(case), IMITATION, runs=short)
-    as_printed = Family(case, studio, imitation) if imitated else None
+    as_printed = Family(case, studio, imitation) if imitated and short else None
     values = [claim.measure(shipped) for claim in case.claims]
     other = [as_printed.value(claim) if as_printed and claim.needs else None for claim in case.claims]
     nearby = [] if brief else [Family(case, studio, Variation(f"start {i}", c)) for i, c in enumerate(case.nearby, 1)]

@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 Window = tuple[float, float]
 
 SPIN, ADVANCE, TORQUE, WEIGHT, DEPTH = "bit_angular_speed", "bit_axial_speed", "bit_torque", "bit_weight", "bit_depth"
-NAMES = (SPIN, ADVANCE, TORQUE, WEIGHT, DEPTH)
+TOP_SPIN, TOP_TORQUE, POWER = "top_angular_speed", "top_torque", "top_power"
+SIDE_FORCE, WALL_TORQUE, PENETRATION = "side_force", "wall_torque", "penetration"
+NAMES = (SPIN, ADVANCE, TORQUE, WEIGHT, DEPTH, TOP_SPIN, TOP_TORQUE, POWER, SIDE_FORCE, WALL_TORQUE, PENETRATION)
 LINES = 60
 """How many lines of a spectrum are looked at."""
 
@@ -40,22 +42,49 @@ class Reading(NamedTuple):
 
 @dataclass
 class Signals:
-    """A run: its scene, the bit's signals (n,) over ``time`` (s), wall seconds it took, and how it is read."""
+    """A run: its scene, signals (n,) over ``time`` (s), wall seconds it took, how it is read, and its pictures."""
 
     scene: Scene
     time: NDArray[np.float64]
     values: dict[str, NDArray[np.float64]]
     wall: float = 0.0
     reading: Reading = field(default_factory=Reading)
+    fields: xr.Dataset | None = None
 
     @classmethod
-    def of(cls, scene: Scene, history: xr.Dataset, wall: float) -> Signals:
-        """The signals of a history."""
-        return cls(scene, history["time"].values, {name: history[name].values for name in NAMES}, wall)
+    def of(cls, scene: Scene, history: xr.Dataset, wall: float, fields: xr.Dataset | None = None) -> Signals:
+        """The signals of a history, and the pictures of the whole string that were kept."""
+        values = {name: history[name].values for name in NAMES if name in history}
+        return cls(scene, history["time"].values, values, wall, fields=fields)
 
     def read_as(self, reading: Reading) -> Signals:
         """The same run, read in another way."""
-        return Signals(self.scene, self.time, self.values, self.wall, reading)
+        return Signals(self.scene, self.time, self.values, self.wall, reading, self.fields)
+
+    def picture(self, time: float) -> dict[str, NDArray[np.float64]] | None:
+        """Fields along the string at the picture nearest to a time (s); None if none is within an interval of it."""
+        if self.fields is None:
+            return None
+        at = self.fields["time"].values
+        i = int(np.argmin(np.abs(at - time)))
+        if abs(at[i] - time) > self.scene.output.fields_interval:
+            return None
+        return {
+            str(name): x.values[i] if "time" in x.dims else x.values for name, x in self.fields.data_vars.items()
+        }
+
+    def side_load(self, time: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Arc lengths (n,) in m, and the wall's normal force (n,) there over the weight per length of the string.
+
+        Of the picture at a time (s), at the start by default; None if there is none, or no wall.
+        """
+        seen = self.picture(time)
+        if seen is None or "wall_side_force" not in seen:
+            return None
+        s, sections = seen["wall_arc_length"], self.scene.string
+        i = np.clip(np.searchsorted(self.scene.interfaces, s) - 1, 0, len(sections) - 1)
+        weight = self.scene.gravity.magnitude * np.array([x.mass_per_length for x in sections])[i]
+        return s, seen["wall_side_force"] / weight
 
     @cached_property
     def _lines(self) -> dict[tuple[str, Window], list[Peak]]:

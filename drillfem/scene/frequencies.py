@@ -68,7 +68,7 @@ def _ends(scene: Scene) -> Iterator[tuple[str, End, End]]:
     ends = scene.ends
     mass, inertia = lumped_at_bit(scene) if scene.inertia.distributed != 1 else (0.0, 0.0)
     # a string that drills hangs on a constant load
-    hangs = ends.top == "free" or (ends.top == "driven" and scene.drills)
+    hangs = ends.top == "free" or scene.hangs
     clamped = ends.bottom == "clamped"
     yield "axial", End(not hangs, ends.top_mass), End(clamped, ends.bottom_mass + mass)
     yield (

@@ -87,6 +87,8 @@ def obstacle(scene: Scene, model: str) -> str:
         return "" if scene.reference.shape == "straight" else "the unstressed string is bent"
     if model == "lumped" and not scene.drills:
         return "it stands for a string on a cutting bit, and there is none"
+    if model in ("lumped", "torsional") and scene.bites and (why := _beyond_condensation(scene)):
+        return why
     if model not in ("lumped", "torsional") and any(s.name == SPRING for s in scene.string):
         return "it was given by numbers and has no string"
     if model in STRAIGHT:
@@ -123,6 +125,17 @@ def obstacle(scene: Scene, model: str) -> str:
         if any(abs(x) > 1e-12 for x in out):
             return "loads or motions lead out of the plane x-z"
     return ""
+
+
+def _beyond_condensation(scene: Scene) -> str:
+    """Why a bit on rock needs more than the lumped and the torsional model, which know its string by responses."""
+    if not scene.drills:
+        return "its bit cuts, by another law than this scene's"
+    if scene.top_drive.follows:
+        return f"its top turns at a given speed, not by a torque (top_drive.kind = {scene.top_drive.kind!r})"
+    if scene.top_drive.block_speed is not None:
+        return "its top hangs on a given load, and moves as it likes"
+    return "it knows no mud" if scene.mud is not None else ""
 
 
 def giver(name: str) -> str:
@@ -226,7 +239,7 @@ def side_load_rule(scene: Scene) -> Finding:
     sine = max(math.hypot(*g.direction[:2]), math.sin(hole))
     if g.magnitude and (across(g.direction) or sine > 1e-12):
         angle = math.degrees(max(hole, math.atan2(math.hypot(*g.direction[:2]), abs(g.direction[2]))))
-        load = max(s.mass_per_length for s in scene.string) * g.magnitude * sine
+        load = max(scene.weight_per_length(s) for s in scene.string) * sine
         numbers |= {"inclination": angle, "side_load": load}
         why.append(
             f"gravity is inclined by {angle:.3g} deg to the string, which lies on its wall or sags with up to "
@@ -234,8 +247,8 @@ def side_load_rule(scene: Scene) -> Finding:
         )
         contact, torque = scene.contact, scene.nominal().torque_on_bit
         if contact is not None:
-            arm = math.fsum(s.mass_per_length * s.length * s.outer_radius for s in scene.string)
-            rub = numbers["friction_torque"] = contact.friction_dynamic * g.magnitude * sine * arm
+            arm = math.fsum(scene.weight_per_length(s) * s.length * s.outer_radius for s in scene.string)
+            rub = numbers["friction_torque"] = contact.friction_dynamic * sine * arm
             share = f" ({100 * rub / torque:.2g} % of the bit's)" if torque else ""
             why[-1] += f", friction torque {quantity(rub, 'N m')}{share}"
     force, moment = (math.hypot(*v[:2]) for v in (scene.ends.tip_force, scene.ends.tip_moment))
@@ -263,11 +276,11 @@ def tension(scene: Scene) -> tuple[F8, F8] | None:
     at = np.array(scene.interfaces)
     # in a hole that bends, what hangs is the depth gained
     gained = np.diff(at) if along(scene) is None else np.diff(scene.borehole.frame(at).position[:, 2])  # type: ignore[union-attr]
-    weight = down * np.array([s.mass_per_length for s in scene.string]) * gained
+    weight = scene.gravity.direction[2] * np.array([scene.weight_per_length(s) for s in scene.string]) * gained
     below = np.append(weight[::-1].cumsum()[::-1], 0.0)  # weight of the string below each interface
     held = ends.top in ("clamped", "pinned", "hung", "driven")
-    if scene.drills:
-        lowest = -scene.nominal().weight_on_bit
+    if scene.bites:
+        lowest = down * ends.bottom_mass - scene.nominal().weight_on_bit
     elif ends.bottom == "clamped" and held:
         softness = np.array([s.length / s.section_stiffness().axial for s in scene.string])
         # the ends do not move apart: the stretch by tension sums up to nothing
@@ -291,10 +304,10 @@ def critical_weight(scene: Scene, bit_tilts: bool = False) -> float:
     """
     from scipy.linalg import LinAlgError, cholesky_banded
 
-    down = scene.gravity.magnitude * scene.gravity.direction[2]
     lengths, bending, load = [], [], []
     for section in scene.string:
-        k, per_metre = section.section_stiffness().bending1, section.mass_per_length * down
+        k = section.section_stiffness().bending1
+        per_metre = scene.weight_per_length(section) * scene.gravity.direction[2]
         scale = (k / abs(per_metre)) ** (1 / 3) if per_metre else section.length
         n = max(16, min(4000, math.ceil(4 * section.length / scale)))
         lengths += [section.length / n] * n
@@ -379,14 +392,14 @@ def buckling_rule(scene: Scene) -> Finding:
     numbers = {"compression": weight, "critical": critical}
     neutral = scene.length - float(np.interp(0.0, pull[1][::-1], pull[0][::-1])) if pull[1][0] > 0 else scene.length
     numbers["compressed_length"] = neutral
-    what = "weight on bit" if scene.drills else "compression at the bottom"
+    what = "weight on bit" if scene.bites else "compression at the bottom"
     text = f"{what} {quantity(weight, 'N')}, the string buckles at {quantity(critical, 'N')}"
     if scene.ends.bottom == "bit":
         numbers["critical_tilting"] = critical_weight(scene, bit_tilts=True)
         text += f" with the bit held upright as here ({quantity(numbers['critical_tilting'], 'N')} if it could tilt)"
     last, down = scene.string[-1], scene.gravity.magnitude * scene.gravity.direction[2]
     if down > 0:
-        per_metre = last.mass_per_length * down
+        per_metre = scene.weight_per_length(last) * scene.gravity.direction[2]
         helical = numbers["helical"] = 5.55 * (last.section_stiffness().bending1 * per_metre**2) ** (1 / 3)
         if weight > helical:
             text += f"; above {quantity(helical, 'N')} it winds into a helix"

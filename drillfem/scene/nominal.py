@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Nominal:
-    """Steady drilling without oscillation (5-25)-(5-28); SI units."""
+    """Steady drilling without oscillation (5-25)-(5-28), or by the empirical law (B-2)-(B-5); SI units."""
 
     depth_of_cut: float  # d_0 in m per turn, sum over the blades
     rate_of_penetration: float  # V_0 in m/s
@@ -21,20 +21,43 @@ class Nominal:
     weight_on_bit: float  # W_0 in N
 
 
-def nominal(scene: Scene) -> Nominal:
+def nominal(scene: Scene, spin: float | None = None, weight: float | None = None) -> Nominal:
     """Steady drilling (5-26)-(5-28), totals over the blades.
+
+    spin: in the place of the drive's speed (rad/s). weight: in the place of what hangs in the hole (N).
 
     d_0 = (W0 - sigma_1 a l)/(eps_1 a zeta), V_0 = d_0 Omega_0/(2 pi),
     T_0 = (eps_1 d_0 + mu gamma sigma_1 l) a^2/2.
+
+    The weight on the bit is given, or what the hook does not carry, or what drills as fast as the block comes down.
+    Without a bit on rock: no drilling, and all weight on the hook.
     """
-    drive, bit, rock, weight = scene.top_drive, scene.bit, scene.rock, scene.weight
-    if bit is None or rock is None or bit.kind != "cutting":
-        return Nominal(0.0, 0.0, 0.0, weight, 0.0)
-    load = drive.weight_on_bit if drive.weight_on_bit is not None else weight - (drive.hook_load or 0.0)
-    flat = min(load, rock.contact_strength * bit.radius * bit.wear_flat_length)
-    depth = (load - flat) / (rock.intrinsic_specific_energy * bit.radius * bit.inclination)
+    drive, bit, rock = scene.top_drive, scene.bit, scene.rock
+    weight = scene.hanging_weight if weight is None else weight
+    speed = (drive.speed or 0.0) if spin is None else spin
+    if bit is None or bit.kind == "free" or (bit.kind == "cutting" and rock is None):
+        return Nominal(0.0, 0.0, 0.0, weight if drive.hook_load is None else drive.hook_load, 0.0)
+    load = drive.weight_on_bit
+    if load is None and drive.hook_load is not None:
+        load = weight - drive.hook_load
+    block = drive.block_speed or 0.0
+    if bit.kind == "empirical" or rock is None:
+        # beside the laws of the rock, which this room does not know: imported only where a scene asks for it
+        from drillfem.bitrock.empirical import EmpiricalLaw
+
+        law = EmpiricalLaw(**{k: v for k, v in vars(bit.empirical).items() if k != "force"})
+        load = law.weight(block, speed) if load is None else load
+        rate = law.rate_of_penetration(load, speed)
+        depth = 2 * math.pi * rate / abs(speed) if speed else 0.0
+        return Nominal(depth, rate, law.torque(load, speed), weight - load, load)
+    flat = rock.contact_strength * bit.radius * bit.wear_flat_length
+    stiffness = rock.intrinsic_specific_energy * bit.radius * bit.inclination
+    if load is None:
+        load = flat + stiffness * 2 * math.pi * block / speed if block > 0 and speed > 0 else 0.0
+    flat = min(load, flat)
+    depth = (load - flat) / stiffness
     torque = (rock.intrinsic_specific_energy * bit.radius * depth + bit.friction * bit.geometry * flat) * bit.radius / 2
-    return Nominal(depth, depth * (drive.speed or 0.0) / (2 * math.pi), torque, weight - load, load)
+    return Nominal(depth, depth * speed / (2 * math.pi), torque, weight - load, load)
 
 
 class Lumps(NamedTuple):
@@ -135,6 +158,39 @@ def quantity(value: float, unit: str) -> str:
     return f"{value:.4g} {unit}"
 
 
+def _describe_hole(scene: Scene) -> list[tuple[str, str]]:
+    """What `describe` says of a hole that bends, and of the contact with it."""
+    contact = scene.contact
+    if contact is None or not scene.hole.bends or (hole := scene.borehole) is None:
+        return []
+    sharpest, at = hole.sharpest()
+    end = hole.frame(scene.length)
+    north, east, down = end.position[0]
+    widest = max(s.contact_radius for s in scene.string)
+    heaviest = max(scene.string, key=lambda s: s.mass_per_length)
+    load = heaviest.mass_per_length * scene.gravity.magnitude
+    layers = [(4 * s.section_stiffness().bending1 / contact.stiffness) ** 0.25 for s in scene.string]
+    period = 2 * math.pi * math.sqrt(heaviest.mass_per_length / contact.stiffness)
+    return [
+        (
+            "hole",
+            f"{scene.hole.kind}: at {scene.length:g} m inclined by {math.degrees(end.inclination[0]):.4g} deg, "
+            f"{north:.5g} m north, {east:.5g} m east, {down:.6g} m down",
+        ),
+        (
+            "sharpest bend",
+            f"{math.degrees(sharpest) * 30:.3g} deg per 30 m at {at:.5g} m (radius {1 / sharpest:.4g} m)",
+        ),
+        ("smallest clearance", quantity(float(hole.table.radius.min()) - widest, "m")),
+        (
+            "contact",
+            f"{quantity(load / contact.stiffness, 'm')} deep under the weight of the {heaviest.name}, boundary "
+            f"layer "
+            f"{min(layers):.3g} to {max(layers):.3g} m, period {quantity(period, 's')}",
+        ),
+    ]
+
+
 def describe(scene: Scene) -> list[tuple[str, str]]:
     """What follows from a scene, as (label, value with unit), for `drillfem info`."""
     model, reason = scene.resolved_model()
@@ -156,6 +212,10 @@ def describe(scene: Scene) -> list[tuple[str, str]]:
         rows.append(("mass", f"{scene.mass:.6g} kg"))
     if scene.weight > 0:
         rows.append(("weight", f"{scene.weight / 1e3:.6g} kN"))
+    if scene.mud is not None and scene.mass > 0:
+        carried = 1 - scene.weight / (scene.mass * scene.gravity.magnitude * scene.gravity.direction[2] or 1.0)
+        rows.append(("mud", f"carries {100 * carried:.3g} % of the weight"))
+    rows += _describe_hole(scene)
     for s in scene.string:
         k = s.section_stiffness()
         label = f"{s.name}: "
@@ -179,6 +239,14 @@ def describe(scene: Scene) -> list[tuple[str, str]]:
         rows.append(("first torsional frequency", f"{torsional_frequency(scene):.4g} Hz"))
     if scene.bit is not None:
         rows += [("hook load", f"{n.hook_load / 1e3:.6g} kN"), ("weight on bit", q(n.weight_on_bit, "N"))]
+    if scene.bites and not scene.drills:
+        rows += [
+            (
+                "nominal rate of penetration",
+                f"{q(n.rate_of_penetration, 'm/s')} ({n.rate_of_penetration * 3600:.4g} m/h)",
+            ),
+            ("nominal torque on bit", q(n.torque_on_bit, "N m")),
+        ]
     if scene.bit is not None and scene.drills:
         d = dimensionless(scene)
         rows += [

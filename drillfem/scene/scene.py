@@ -11,6 +11,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from drillfem.errors import SceneError
 from drillfem.scene import ladder
 from drillfem.scene.keys import complaint, guess, key, read, shown, write
@@ -141,10 +143,29 @@ class Scene:
         """Mass in kg of the string with the lumps at its ends."""
         return math.fsum(s.mass_per_length * s.length for s in self.string) + self.ends.top_mass + self.ends.bottom_mass
 
+    def weight_per_length(self, section: Section) -> float:
+        """Weight of a section in N/m, less that of the mud which its steel displaces."""
+        displaced = self.mud.density * section.area if self.mud is not None else 0.0
+        return (section.mass_per_length - displaced) * self.gravity.magnitude
+
     @property
     def weight(self) -> float:
-        """Weight along e3 in N of the string with the lumps at its ends."""
-        return self.mass * self.gravity.magnitude * self.gravity.direction[2]
+        """Weight along e3 in N of the string, in its mud, with the lumps at its ends (out of it)."""
+        lumps = (self.ends.top_mass + self.ends.bottom_mass) * self.gravity.magnitude
+        total = math.fsum(self.weight_per_length(s) * s.length for s in self.string) + lumps
+        return total * self.gravity.direction[2]
+
+    @property
+    def hanging_weight(self) -> float:
+        """Load in N on the hook of a string that hangs in its hole: weight down the hole, not what lies on its wall."""
+        hole = self.borehole if self.hole.bends else None
+        if hole is None:
+            return self.weight
+        down = np.array(self.gravity.direction)
+        deep = hole.frame(np.array(self.interfaces)).position @ down
+        carried = math.fsum(self.weight_per_length(s) * h for s, h in zip(self.string, np.diff(deep), strict=True))
+        below = self.ends.bottom_mass * float(hole.frame(np.array([self.length])).tangent[0] @ down)
+        return carried + self.gravity.magnitude * (self.ends.top_mass * down[2] + below)
 
     @property
     def drills(self) -> bool:
@@ -155,6 +176,12 @@ class Scene:
     def bites(self) -> bool:
         """Whether rock loads the bit, by the cutting law or the empirical one."""
         return self.bit is not None and self.bit.kind != "free"
+
+    @property
+    def hangs(self) -> bool:
+        """Whether a constant load holds the top, which is free to move along its axis; else its speed is given."""
+        drive = self.top_drive
+        return self.ends.top == "driven" and drive.block_speed is None and (self.bites or drive.hook_load is not None)
 
     @cached_property
     def borehole(self) -> Borehole | None:
@@ -170,9 +197,12 @@ class Scene:
             return math.inf
         return 2 * math.pi / (self.bit.blades * abs(self.top_drive.speed))
 
-    def nominal(self) -> Nominal:
-        """Steady drilling (5-25)-(5-28); zero depth of cut and torque without a cutting bit."""
-        return nominal(self)
+    def nominal(self, spin: float | None = None, weight: float | None = None) -> Nominal:
+        """Steady drilling (5-25)-(5-28); nothing of it off rock.
+
+        spin: in the place of the speed of the drive (rad/s). weight: in the place of what hangs in the hole (N).
+        """
+        return nominal(self, spin, weight)
 
     def obstacle(self, model: str) -> str:
         """Why `model` cannot represent this scene; empty if it can."""
@@ -188,6 +218,7 @@ class Scene:
         """(dotted key, message) for everything that does not fit together across tables."""
         yield from self._string_problems()
         yield from self._end_problems()
+        yield from self._drive_problems()
         yield from self._drilling_problems()
         if self.hole.bends or self.hole.caliper or self.hole.section:
             _ = self.borehole  # complains itself
@@ -266,6 +297,9 @@ class Scene:
                 yield "initial.state", f"must be one of {', '.join(allowed)} where {where}"
         elif self.initial.state == "laid" and self.hole.kind == "none":
             yield "initial.state", f"must be one of {', '.join(allowed)} where there is no hole to lie in"
+        if drive.rise_time is not None and drive.profile is None and self.initial.state in ("nominal", "literal"):
+            if self.bites:
+                yield "top_drive.rise_time", f"must be left out where initial.state = {self.initial.state!r}, at speed"
         if bit is None:
             if drive.weight_on_bit is not None:
                 yield "top_drive.weight_on_bit", "must be left out where there is no [bit]"
@@ -288,6 +322,7 @@ class Scene:
                 yield "rock", "must be left out for bit.kind = 'empirical', whose numbers stand for it"
             if drive.weight_on_bit is None and drive.hook_load is None and drive.block_speed is None:
                 yield "top_drive.weight_on_bit", "must be a number >= 0 in N, or give hook_load or block_speed"
+            yield from self._load_problems()
             return
         if rock is None:
             yield (
@@ -306,10 +341,17 @@ class Scene:
                     "top_drive.weight_on_bit",
                     "must be a number >= 0 in N, or give top_drive.hook_load or block_speed in its place",
                 )
-            elif self.initial.state in ("nominal", "literal"):
-                yield "initial.state", "must be rest or laid where top_drive.block_speed is given"
+                return
+        yield from self._load_problems()
+
+    def _load_problems(self) -> Iterator[tuple[str, str]]:
+        """Of the weight on a bit that is on rock, and of steady drilling with it."""
+        drive, bit, rock, steady = self.top_drive, self.bit, self.rock, self.initial.state in ("nominal", "literal")
+        assert bit is not None
+        if steady and drive.block_speed is not None and not drive.block_speed > 0:
+            yield "initial.state", f"must be rest or laid where top_drive.block_speed = {drive.block_speed:g} m/s"
             return
-        weight, at_bit = self.weight, self.nominal().weight_on_bit
+        weight, at_bit = self.hanging_weight, self.nominal().weight_on_bit
         if drive.hook_load is not None and at_bit <= 0:
             yield (
                 "top_drive.hook_load",
@@ -317,18 +359,56 @@ class Scene:
             )
         if at_bit > weight:
             yield "top_drive.weight_on_bit", f"must not exceed the string's weight {weight:.6g} N"
-        flat = rock.contact_strength * bit.radius * bit.wear_flat_length
-        if self.initial.state in ("nominal", "literal"):
+        if steady:
             if drive.speed is not None and drive.speed <= 0:
                 yield "top_drive.speed", "must be > 0 rad/s to start from steady drilling"
             if drive.profile == "spin-up":
                 yield "initial.state", "must be one of rest, given for top_drive.profile = 'spin-up'"
-            if at_bit <= flat:
+            if rock is None:
+                least, why = self._least_weight(), "below which the law (B-2) drills nothing at this speed"
+            else:
+                least = rock.contact_strength * bit.radius * bit.wear_flat_length
+                why = (
+                    "which the wear flats carry (rock.contact_strength * bit.radius * bit.wear_flat_length), or "
+                    "nothing is cut"
+                )
+            if at_bit <= least:
                 yield (
                     "top_drive.hook_load" if drive.weight_on_bit is None else "top_drive.weight_on_bit",
-                    f"{at_bit:.6g} N on the bit must exceed {flat:.6g} N, which the wear flats carry "
-                    "(rock.contact_strength * bit.radius * bit.wear_flat_length), or nothing is cut",
+                    f"{at_bit:.6g} N on the bit must exceed {least:.6g} N, {why}",
                 )
+
+    def _least_weight(self) -> float:
+        """Weight (N) at which an empirical bit begins to drill at the speed of the top."""
+        from drillfem.bitrock.empirical import EmpiricalLaw
+
+        return EmpiricalLaw.from_scene(self).weight(0.0, self.top_drive.speed or 0.0)
+
+    def _drive_problems(self) -> Iterator[tuple[str, str]]:
+        """Of the top drive's own, and of the mud."""
+        drive, mud, hole = self.top_drive, self.mud, self.hole
+        if drive.kind == "soft-torque" and self.ends.top_inertia == 0:
+            yield "ends.top_inertia", "must be > 0 kg m^2, the drive's, for top_drive.kind = 'soft-torque'"
+        moves = self.ends.top == "driven" and (self.hangs or bool(drive.block_speed))
+        borehole = self.borehole if hole.bends and moves else None
+        if borehole is not None:
+            lean = float(borehole.frame(np.array([0.0])).inclination[0])
+            names = ("block_speed", "hook_load", "weight_on_bit")
+            name = next((n for n in names if getattr(drive, n) is not None), "weight_on_bit")
+            if lean > 1e-3:
+                yield (
+                    f"top_drive.{name}",
+                    f"must be left out where the hole starts inclined, here by {math.degrees(lean):.3g} deg: the hook "
+                    "moves the top along the vertical",
+                )
+        if mud is None:
+            return
+        for i, s in enumerate(self.string):
+            if s.outer_diameter is None:
+                yield f"string.{i}.outer_diameter", "must be given in m where there is [mud]"
+        for name, given in (("viscosity", mud.viscosity > 0), ("added_mass", mud.added_mass)):
+            if given and hole.kind == "none":
+                yield f"mud.{name}", "must be left out where hole.kind = 'none': it is the hole that confines the mud"
 
     def _numerics_problems(self) -> Iterator[tuple[str, str]]:
         time, output = self.time, self.output
@@ -365,7 +445,7 @@ class Scene:
     def condensable(self) -> bool:
         """Whether the string is linear but for its bit, so that the condensed engine can run it."""
         dynamic = self.drills and self.time.analysis == "dynamic" and not self.top_drive.follows
-        dynamic = dynamic and self.top_drive.block_speed is None and self.ends.top_inertia == 0
+        dynamic = dynamic and self.top_drive.block_speed is None and self.mud is None
         return dynamic and self.resolved_model().name in ("lumped", "torsional", "axial-torsional")
 
     @property

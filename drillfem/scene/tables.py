@@ -191,6 +191,13 @@ class Contact:
     )
     smoothing: float = key("smooth: half the range of gap over which the force builds up", "m", POSITIVE, default=1e-3)
     penetration_tolerance: float = key("augmented: penetration that is small enough", "m", POSITIVE, default=1e-5)
+    retardation_time: float = key(
+        "time by which the rate of penetration counts beside the penetration: damps bouncing; 'augmented' takes "
+        "time.step at least",
+        "s",
+        NOT_NEGATIVE,
+        default=0.0,
+    )
     friction_velocity_scale: float = key("n: the peak lies near the speed 1/n", "s/m", POSITIVE, default=20.0)
     friction_regularisation: float = key("epsilon: rounds the law off at zero speed", "1", POSITIVE, default=1e-4)
     friction_profile: tuple[Vector, ...] | None = key(
@@ -373,6 +380,11 @@ class Empirical:
     a4: float = key("a_4: torque per depth of cut", "N rad", NOT_NEGATIVE, default=9.537e6)
     a5: float = key("a_5: torque at no depth of cut", "N m", NOT_NEGATIVE, default=1475.0)
     regularisation: float = key("epsilon: spin over which all of it builds up", "rad/s", POSITIVE, default=2.0)
+    force: str = key(
+        "weight in the law: 'reaction' is the force between bit and rock, 'nominal' the constant weight on bit",
+        choices=("reaction", "nominal"),
+        default="reaction",
+    )
 
 
 _BY_CUTTING = "required by a cutting bit"
@@ -491,6 +503,12 @@ class Initial:
     spin_perturbation: float = key(
         "excess of spin at the bit as a fraction of the top's, falling linearly to the top", default=0.1
     )
+    spin: float | None = key(
+        "spin of the whole string at the start, of nominal and literal; spin_perturbation comes on top",
+        "rad/s",
+        default=None,
+        default_text="top_drive.speed",
+    )
     velocity: Vector = key(
         "velocity of the top end; only with state = 'given'", "m/s", count=3, default=(0.0, 0.0, 0.0)
     )
@@ -509,6 +527,8 @@ class Initial:
         for name in ("velocity", "angular_velocity"):
             if self.state != "given" and any(getattr(self, name)):
                 yield name, f"must be left out where state = {self.state!r}"
+        if self.spin is not None and self.state not in ("nominal", "literal"):
+            yield "spin", f"must be left out where state = {self.state!r}"
 
 
 @dataclass(frozen=True)

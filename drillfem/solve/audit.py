@@ -20,9 +20,11 @@ WORKS = {
     "work_gravity": "work of gravity",
     "work_hook_load": "work of the hook load and other end forces",
     "work_bit": "work taken by the rock",
-    "dissipated": "work lost to internal damping",
+    "dissipated": "work lost to internal damping and to mud",
     "work_wall": "work of contact and friction at the wall",
 }
+#: Part of the work at the wall that friction took; the rest is stored in the contact, and comes back.
+FRICTION = "work_friction"
 
 _OF_THE_BIT = {name: v.units for name, v in STANDARD.items() if name.startswith("bit_") or name == "depth_of_cut"}
 #: History variables of every run, and those that rock adds: name to unit.
@@ -33,7 +35,7 @@ TIP = {"tip_x": "m", "tip_y": "m", "tip_z": "m"}
 
 #: of the lower end of a string that turns, and of a string in contact with its hole
 TURNING = {name: _OF_THE_BIT[name] for name in ("bit_angular_speed", "bit_axial_speed", "bit_angle")}
-WALL = {"side_force": "N", "wall_torque": "N m", "penetration": "m"}
+WALL = {"side_force": "N", "wall_torque": "N m", "penetration": "m", FRICTION: "J"}
 
 
 def variables(drilling: bool, turning: bool = False, wall: bool = False) -> dict[str, str]:
@@ -64,9 +66,12 @@ class EnergyAudit:
     stored_at_start: float
     time: float
     powers: dict[str, float]
-    works: dict[str, float] = field(default_factory=lambda: dict.fromkeys(WORKS, 0.0))
+    works: dict[str, float] = field(default_factory=dict)
     #: largest of stored energy and energy that went through, the scale of the error
     scale: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.works = dict.fromkeys([*WORKS, *self.powers], 0.0) | self.works
 
     def add(self, time: float, powers: dict[str, float]) -> None:
         """Powers (W) at ``time`` (s): of drive, gravity and hook into the string, the others out of it."""
@@ -75,8 +80,12 @@ class EnergyAudit:
             self.works[name] += half * (power + self.powers[name])
         self.time, self.powers = time, powers
 
-    def error(self, stored: float) -> float:
-        """Relative error of the balance when kinetic and strain energy are ``stored`` (J)."""
-        works = {name: np.array([value]) for name, value in self.works.items()}
+    def until(self, time: float) -> dict[str, float]:
+        """Works (J) until ``time`` (s), which may lie behind the last evaluation by a part of a step."""
+        return {name: work + (time - self.time) * self.powers[name] for name, work in self.works.items()}
+
+    def error(self, stored: float, works_done: dict[str, float]) -> float:
+        """Relative error of the balance when kinetic and strain energy are ``stored`` (J), after these works (J)."""
+        works = {name: np.array([value]) for name, value in works_done.items()}
         error, self.scale = imbalance(works, np.array([stored]), self.stored_at_start, self.scale)
         return float(error[0])

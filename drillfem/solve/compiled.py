@@ -36,7 +36,8 @@ class CompiledSystem:
         self._time, self._b = 0.0, 1.0
         self._has_rate = self._has_known = False
         self._solver = NativeSolver(rod.tangent, rod)
-        self._stage = NativeStage(self.x, self.x0, self.rate, rod.u.x.array, rod.u_dot.x.array)
+        self._u, self._u_dot = rod.u.x.array, rod.u_dot.x.array
+        self._stage = NativeStage(self.x, self.x0, self.rate, self._u, self._u_dot)
 
     def set(self, t: float, a: float, b: float, rate: bool, known: bool) -> None:
         """State the equations of a stage at time t (s); b in 1/s. ``rate``, ``known``: whether these take part."""
@@ -47,12 +48,17 @@ class CompiledSystem:
         """See :class:`drillfem.solve.newton.System`."""
         rod, f = self.rod, self._f
         self._stage(self.stage_fraction, self._b, self._has_rate)
-        rod.residual(self._time, rod.u.x.array, rod.u_dot.x.array, f)
+        rod.residual(self._time, self._u, self._u_dot, f)
         if self.stage_fraction != 1.0:
             f *= 1 / self.stage_fraction
         if self._has_known:
             f -= self.known
         return f
+
+    def settle(self) -> None:
+        """See :class:`drillfem.solve.newton.System`."""
+        self._stage(self.stage_fraction, self._b, self._has_rate)
+        self.rod.observe(self._u, self._u_dot)
 
     def shift(self) -> float:
         """See :class:`drillfem.solve.newton.System`."""

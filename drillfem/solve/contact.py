@@ -1,12 +1,13 @@
-"""The rock as seen by a string that PETSc steps: bit-rock law and rock surface behind one interface."""
+"""The rock as seen by a string that PETSc steps: bit-rock laws, and a rock surface, behind one interface."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from ..bitrock.empirical import EmpiricalLaw, solve_empirical
 from ..bitrock.jit import announce
 from ..bitrock.law import BitLaw
 from ..bitrock.solve import bit_step
@@ -42,6 +43,54 @@ def surface_of(scene: Scene) -> RockSurface:
 
         operators = advection_operators(surface.degree, surface.elements, 2 * np.pi / bit.blades, surface.scheme)
     return RockSurface.from_scene(scene, operators)
+
+
+class Rock(Protocol):
+    """What a bit drills: answers the Newton iteration, and is drilled after every step."""
+
+    def at_rest(self, speed: float, spin: float, depth: float) -> tuple[float, float]:
+        """Weight and torque (N, N m) of a bit that moves like this."""
+        ...
+
+    def respond(
+        self,
+        speed: float,
+        speed_compliance: float,
+        depth: float,
+        depth_compliance: float,
+        spin: float,
+        spin_compliance: float,
+        turn: float,
+        turn_compliance: float,
+    ) -> tuple[float, float]:
+        """See :class:`drillfem.solve.newton.BitLoad`."""
+        ...
+
+    def commit(self, turn: float, depth: float, step: float, speed0: float, speed1: float, spin: float) -> None:
+        """The bit has turned by ``turn`` (rad) and gone to ``depth`` (m) in a step (s); axial speeds in m/s."""
+        ...
+
+    def row(self) -> dict[str, float]:
+        """History variables besides motion and loads of the bit."""
+        ...
+
+    def picture(self) -> dict[str, Array]:
+        """Fields for pictures."""
+        ...
+
+    def save(self) -> dict[str, Any]:
+        """State for a checkpoint."""
+        ...
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Restore a state of :meth:`save`."""
+        ...
+
+
+def rock_of(scene: Scene) -> Rock:
+    """The rock under the bit of a scene."""
+    assert scene.bit is not None
+    return RockContact.from_scene(scene) if scene.bit.kind == "cutting" else EmpiricalContact.from_scene(scene)
 
 
 class RockContact:
@@ -109,6 +158,10 @@ class RockContact:
         """Volume of rock cut so far (m3)."""
         return self.surface.removed * self.law.radius**2 / 2
 
+    def row(self) -> dict[str, float]:
+        """See :class:`Rock`."""
+        return {"depth_of_cut": self.depth_of_cut(), "rock_volume": self.volume}
+
     def picture(self) -> dict[str, Array]:
         """Surface for pictures: ``rock_angle`` (rad, from a blade backwards) and ``rock_height`` (m)."""
         return rock_picture(self.surface)
@@ -122,3 +175,64 @@ class RockContact:
         state = dict(state)
         self.spin, self.depth = float(state.pop("spin")), float(state.pop("depth"))
         self.surface.load(state)
+
+
+class EmpiricalContact:
+    """Answers the Newton iteration by the empirical law (B-5); a bit is on bottom where it is as deep as ever."""
+
+    def __init__(self, law: EmpiricalLaw, weight: float, spin: float) -> None:
+        """weight: of a bit that stands on the bottom at the start (N); spin: of the bit at the start (rad/s)."""
+        self.law, self.weight = law, weight
+        self._par = law.array
+        self.spin, self.bottom, self._rate = spin, 0.0, 0.0
+
+    @classmethod
+    def from_scene(cls, scene: Scene) -> EmpiricalContact:
+        """Rock of a scene, in nominal drilling."""
+        announce()
+        return cls(EmpiricalLaw.from_scene(scene), scene.nominal().weight_on_bit, 0.0)
+
+    def at_rest(self, speed: float, spin: float, depth: float) -> tuple[float, float]:
+        """Weight and torque (N, N m) of a bit that moves like this; the nominal weight of one that stands."""
+        self.spin, self.bottom, self._rate = spin, depth, max(0.0, speed)
+        weight = self.law.weight(speed, spin) if speed > 0 and not self.law.constant_weight else self.weight
+        return weight, self.law.torque(weight, spin)
+
+    def respond(
+        self,
+        speed: float,
+        speed_compliance: float,
+        depth: float,
+        depth_compliance: float,
+        spin: float,
+        spin_compliance: float,
+        turn: float,
+        turn_compliance: float,
+    ) -> tuple[float, float]:
+        """See :class:`drillfem.solve.newton.BitLoad`."""
+        if depth < self.bottom:  # where it would be if nothing held it
+            self._rate = 0.0
+            return 0.0, 0.0
+        weight, torque, _, rate = solve_empirical(self._par, speed, speed_compliance, spin, spin_compliance, self.spin)
+        self._rate = max(0.0, rate)
+        return weight, torque
+
+    def commit(self, turn: float, depth: float, step: float, speed0: float, speed1: float, spin: float) -> None:
+        """See :class:`Rock`."""
+        self.bottom, self.spin = max(self.bottom, depth), spin
+
+    def row(self) -> dict[str, float]:
+        """Depth of cut per turn (m); 0 while the bit does not turn."""
+        return {"depth_of_cut": 2 * np.pi * self._rate / abs(self.spin) if self.spin else 0.0}
+
+    def picture(self) -> dict[str, Array]:
+        """The law knows no surface."""
+        return {}
+
+    def save(self) -> dict[str, Any]:
+        """State for a checkpoint."""
+        return {"spin": self.spin, "bottom": self.bottom, "rate": self._rate}
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Restore a state of :meth:`save`."""
+        self.spin, self.bottom, self._rate = (float(state[name]) for name in ("spin", "bottom", "rate"))

@@ -12,8 +12,8 @@ from ..compat import Array
 from ..errors import SimulationError
 from ..models.rod import Rod
 from ..results import ResultWriter
-from .audit import COMMON, TIP, WORKS, EnergyAudit, variables
-from .contact import RockContact
+from .audit import COMMON, FRICTION, TIP, WORKS, EnergyAudit, variables
+from .contact import Rock, rock_of
 from .dynamics import Marcher, Stepper
 from .guards import runaway
 from .interrupt import Interrupts
@@ -41,7 +41,7 @@ class DirectRun:
         marcher = _marcher(scene.engine)
         marcher.adopt(rod)
         u0 = start_of(rod)
-        self.rock = RockContact.from_scene(scene) if rod.has_bit else None
+        self.rock: Rock | None = rock_of(scene) if rod.has_bit else None
         self.stepper = marcher(rod, u0, self.rock)
         self.bit_angle = 0.0
         self.steps = 0
@@ -79,6 +79,7 @@ class DirectRun:
         kinetic, strain = rod.energies()
         self._stored = kinetic + strain
         self.audit = EnergyAudit(self._stored, rod.scene.time.start, self._powers(rod.scene.time.start))
+        self._works = self.audit.until(rod.scene.time.start)
 
     # -- one step ------------------------------------------------------------------------------------------------------
 
@@ -86,18 +87,21 @@ class DirectRun:
         """Powers at the state last evaluated (the integrator's stage)."""
         rod = self.rod
         p = rod.powers()
-        spin = rod.scene.top_drive.motion(t)[1]
+        drive = rod.top_torque(t) * rod.scene.top_drive.motion(t)[1]
+        if rod.drive is not None:
+            drive = rod.drive.power(t, *rod.top_motion(rod.u.x.array))
         bit = 0.0
         if rod.has_bit:
             bit = float(rod.bit_load @ rod.end_motion(rod.u.x.array)[1:])
-        return {
-            "work_top_drive": rod.top_torque() * spin,
+        out = {
+            "work_top_drive": drive,
             "work_gravity": -p["gravity"],
             "work_hook_load": rod.end_power(),
             "work_bit": bit,
             "dissipated": p["damping"],
-            "work_wall": p.get("wall", 0.0),
+            "work_wall": p.get("contact", 0.0) + p.get("friction", 0.0),
         }
+        return out | ({FRICTION: p.get("friction", 0.0)} if rod.wall is not None else {})
 
     def step(self, until: float) -> float:
         """One accepted step; moves the rock, books the energy. Returns the time."""
@@ -105,6 +109,8 @@ class DirectRun:
         before = self._motion[1]
         report = self.stepper.step(until)
         self.audit.add(report.stage_time, self._powers(report.stage_time))
+        if rod.drive is not None:
+            self.audit.works["work_top_drive"] += rod.drive.work
         if rod.turns:
             u = self.stepper.u
             turn = turn_between(self.rotation, u[rod.bit.rotation])
@@ -119,20 +125,22 @@ class DirectRun:
     def row(self, t: float) -> dict[str, float]:
         """History row of the present state."""
         rod, u = self.rod, self.stepper.u
-        reaction = rod.top_torque()
+        torque, speed = rod.top_torque(t), rod.scene.top_drive.motion(t)[1]
+        if rod.drive is not None:
+            torque, speed = rod.drive.torque(), rod.drive.speed
+        hook_load = rod.hook_load()
         rod.set_state(u, rod.u_dot.x.array)
         kinetic, strain = rod.energies()
-        speed = rod.scene.top_drive.motion(t)[1]
         out = {
-            "top_torque": reaction,
+            "top_torque": torque,
             "top_angular_speed": speed,
-            "hook_load": -float(rod.loads.top.force.value[2]),
-            "top_power": reaction * speed,
+            "hook_load": hook_load,
+            "top_power": torque * speed,
             "kinetic_energy": kinetic,
             "strain_energy": strain,
-            **self.audit.works,
         }
-        self._stored = kinetic + strain
+        self._stored, self._works = kinetic + strain, self.audit.until(t)
+        out |= self._works
         if rod.wall is not None:
             out |= rod.wall_row()
         if rod.turns:
@@ -143,8 +151,7 @@ class DirectRun:
                 "bit_depth": depth,
                 "bit_torque": float(rod.bit_load[1]),
                 "bit_weight": float(rod.bit_load[0]),
-                "depth_of_cut": self.rock.depth_of_cut(),
-                "rock_volume": self.rock.volume,
+                **self.rock.row(),
             }
         r, _ = rod.shape()
         return out | dict(zip(TIP, r[-1].tolist(), strict=True))
@@ -159,7 +166,7 @@ class DirectRun:
     def save(self) -> dict[str, Any]:
         """Everything that a continuation needs."""
         rod = self.rod
-        self.audit.error(self._stored)  # brings the scale up to date
+        self.audit.error(self._stored, self._works)  # brings the scale up to date
         state: dict[str, Any] = {
             "stored": self._stored,
             "u": self.stepper.u.copy(),
@@ -173,10 +180,15 @@ class DirectRun:
             "audit_scale": self.audit.scale,
             "powers": dict(self.audit.powers),
             "works": dict(self.audit.works),
+            "works_of_row": dict(self._works),
             "time_step": self.stepper.length,
         }
         if self.rock is not None:
             state["rock"] = self.rock.save()
+        if rod.drive is not None:
+            state["drive"] = rod.drive.save()
+        if rod.wall is not None:
+            state["multipliers"] = rod.wall.multipliers.copy()
         return state
 
     def load(self, t: float, state: dict[str, Any]) -> None:
@@ -194,10 +206,20 @@ class DirectRun:
             {k: float(v) for k, v in state["works"].items()},
             float(state["audit_scale"]),
         )
+        self._works = {k: float(v) for k, v in state["works_of_row"].items()}
         if self.rock is not None:
             self.rock.load(state["rock"])
-        rod.seek_hole(stepper.u)
+        if rod.drive is not None:
+            rod.drive.load(state["drive"], rod.top_motion(stepper.u)[0])
+        if rod.wall is not None:
+            rod.wall.multipliers[:] = state["multipliers"]
+            rod.seek_hole(stepper.u)
         self._mark_bit(stepper.u)
+
+    def restart(self) -> None:
+        """Forget everything but the state, as a run does that is resumed here."""
+        self.stepper.restart()
+        self.rod.seek_hole(self.stepper.u)
 
     def summary(self) -> dict[str, Any]:
         """Counts and the energy balance up to the last row, for the summary."""
@@ -205,7 +227,7 @@ class DirectRun:
             "steps": self.steps,
             "newton_iterations": self.stepper.newton.iterations,
             "rejected_steps": self.stepper.rejected,
-            "energy_balance_error": self.audit.error(self._stored),
+            "energy_balance_error": self.audit.error(self._stored, self._works),
             "factorisations": self.stepper.newton.factorisations,
         }
 
@@ -226,7 +248,10 @@ def run_dynamic(scene: Any, writer_of: Callable[..., ResultWriter], until: float
     """March a scene to ``until``, writing as it goes. Returns the Result."""
     rod = Rod(scene)
     run = DirectRun(rod)
-    writer = writer_of(rod.model, rod.size, variables(rod.has_bit, rod.turns, rod.wall is not None))
+    names = variables(rod.has_bit, rod.turns, rod.wall is not None)
+    if not scene.drills:
+        names.pop("rock_volume", None)  # the empirical law knows no surface
+    writer = writer_of(rod.model, rod.size, names)
     start = scene.time.start
     out = scene.output
     try:
@@ -239,7 +264,7 @@ def run_dynamic(scene: Any, writer_of: Callable[..., ResultWriter], until: float
                 writer.append(t, run.row(t))
                 writer.field(t, run.fields())
                 writer.checkpoint(t, run.save())
-            run.stepper.restart()
+            run.restart()
             rows, pictures = grid(start, out.interval, t), grid(start, out.fields_interval, t)
             saves = grid(start, out.checkpoint_interval, t)
             next_row, next_picture, next_save = next(rows), next(pictures), next(saves)
@@ -261,7 +286,7 @@ def run_dynamic(scene: Any, writer_of: Callable[..., ResultWriter], until: float
                         next_picture = next(pictures)
                     if t >= next_save - tiny:
                         writer.checkpoint(t, run.save())
-                        run.stepper.restart()
+                        run.restart()
                         next_save = next(saves)
             finally:
                 writer.update(**run.summary())
@@ -277,15 +302,12 @@ def run_static(scene: Any, writer_of: Callable[..., ResultWriter], progress: Obs
     u0 = start_of(rod)
     writer = writer_of(rod.model, len(statics.x.x.array), variables(False))
     force, moment, g = (c.value.copy() for c in (rod.tip_force, rod.tip_moment, rod.loads.g))
-    n = len(rod.ansatz.x_names)
 
     def set_load(factor: float) -> None:
         rod.tip_force.value, rod.tip_moment.value, rod.loads.g.value = factor * force, factor * moment, factor * g
 
     def record(factor: float, x: Array) -> None:
-        u = np.zeros((len(rod.nodes), rod.ansatz.size))
-        u[:, :n] = x.reshape(-1, n)
-        rod.set_state(u.reshape(-1), np.zeros(rod.size))
+        rod.set_state(statics.state(x), np.zeros(rod.size))
         r, _ = rod.shape()
         zero = dict.fromkeys([*COMMON, *WORKS], 0.0)
         writer.append(factor, zero | {"strain_energy": rod.energies()[1]} | dict(zip(TIP, r[-1].tolist(), strict=True)))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..compat import Array
+from ..compat import Array, ScalarForm, VectorForm
 from ..errors import SimulationError
 from ..models.rod import Rod
 from ..scene import Time
@@ -114,6 +114,10 @@ class PetscSystem:
         array: Array = self._f.getArray()
         return array
 
+    def settle(self) -> None:
+        """See :class:`drillfem.solve.newton.System`."""
+        self._snes.computeFunction(self.x, self._f)
+
     def shift(self) -> float:
         """See :class:`drillfem.solve.newton.System`."""
         self._only_shift = True
@@ -177,10 +181,13 @@ class Marcher(ABC):
         self.rejected = 0
         self._trouble = 0
         self._fresh = True
+        kind, theta = integrator_of(self.time, rod.has_bit)
+        rod.begin(u, theta if kind == "theta" else 1.0)
 
     @classmethod
     def adopt(cls, rod: Rod) -> None:
-        """Make a new rod fit for this engine."""
+        """Tell a new rod who assembles for it."""
+        rod.vector_form, rod.scalar_form = VectorForm, ScalarForm
 
     @property
     @abstractmethod
@@ -234,10 +241,12 @@ class Marcher(ABC):
                 f"time stepping breaks down at t = {now:.6g} s (step {now - t:.2g} s, nearly every one refused): "
                 "try a smaller time.step or another time.integrator"
             )
+        self.rod.accept(now, self.u)
         return StepReport(now, now - t, self.stage_time)
 
     def destroy(self) -> None:
-        """Free what is not Python's."""
+        """Free what is kept."""
+        self.newton.forget()
 
 
 class Stepper(Marcher):

@@ -1,7 +1,8 @@
 """What is known to fail, computed before a run, and the one failure that is watched for during it.
 
 Every guard answers with a sentence that holds the number it computed and what to do instead. They cost
-milliseconds: scalar recurrences of the integrators, exact waves of the string, and the linear stability of the cut.
+milliseconds: scalar recurrences of the integrators, exact waves of the string, the linear stability of the cut, and
+the soft string in its hole (`drillfem.solve.wall_guards`).
 docs/failure-atlas.md shows each failure; tests/stability holds the page to it.
 """
 
@@ -22,83 +23,40 @@ from ..scene.frequencies import straight_frequencies
 from ..scene.tables import Surface
 from ..stability.loop import DrillingLoop
 from ..stability.transfer import surface_delay
+from . import wall_guards
+from .integrators import Method, method_of
+
+__all__ = [
+    "CORRECTION",
+    "GUARDS",
+    "PASSAGE",
+    "RUNAWAY",
+    "TOLERATED",
+    "Method",
+    "Waves",
+    "boundary",
+    "locking_factor",
+    "method_of",
+    "quaternion_norm",
+    "refuse",
+    "runaway",
+    "self_excitation",
+    "warnings",
+    "waves",
+    "wear_flat_feed",
+]
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 #: steps between two blades below which an engine distorts the self-excitation
-PASSAGE = {"petsc": 64, "condensed": 16}
+PASSAGE = {"petsc": 64, "compiled": 64, "condensed": 16}
 #: spin of the bit over that of the top at which a run has run away
 RUNAWAY = 20.0
 #: share of an amplitude that an integrator may take per period, and of a growth rate that a surface may take
 TOLERATED = 0.01
 #: k in q-dot = ... + k (1 - q.q) q, forms.ansatz.Spatial.correction
 CORRECTION = 1.0
-
-
-# -- integrators on a wave ------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Method:
-    """A time integrator and its parameter; ``kind``: bdf, theta, generalized-alpha (PETSc's), central differences."""
-
-    kind: str
-    order: int = 2
-    theta: float = 0.5
-    rho_infinity: float = 0.9
-
-    def __str__(self) -> str:
-        number = {"bdf": f"order = {self.order}", "theta": f"theta = {self.theta:g}"}
-        return f"{self.kind!r} with {number.get(self.kind, f'rho_infinity = {self.rho_infinity:g}')}"
-
-    def amplification(self, exponent: Complex | complex) -> Array:
-        """Growth per step, |largest root|, of u' = lambda u at ``exponent`` z = lambda h (any shape), after start-up.
-
-        Central differences take undamped waves only: u_1 - 2 u_0 + u_-1 = z^2 u_0.
-
-        BDF(k): sum_j (1/j) backward-difference^j = z (Hairer & Wanner, III.1). Generalised-alpha, first order:
-        alpha_m = (3 - rho)/(2 + 2 rho), alpha_f = 1/(1 + rho), gamma = 1/2 + alpha_m - alpha_f (Jansen et al. 2000).
-        """
-        z: Complex = np.asarray(exponent, np.complex128)
-        if self.kind == "theta":
-            return np.asarray(np.abs((1 + (1 - self.theta) * z) / (1 - self.theta * z)))
-        if self.kind == "central differences":
-            half = 1 + z**2 / 2
-            return np.asarray(np.maximum(*(np.abs(half + s * np.sqrt(half**2 - 1)) for s in (1, -1))))
-        if self.kind == "bdf":
-            k = self.order
-            c = [sum((-1) ** i * math.comb(j, i) / j for j in range(max(1, i), k + 1)) for i in range(k + 1)]
-            step = np.zeros((*z.shape, k, k), dtype=np.complex128)
-            step[..., 0, :] = -np.array(c[1:]) / (c[0] - z)[..., None]
-            step[..., range(1, k), range(k - 1)] = 1.0
-        else:
-            rho = self.rho_infinity
-            m, f = (3 - rho) / (2 + 2 * rho), 1 / (1 + rho)
-            g = 0.5 + m - f
-            new, old = (np.zeros((*z.shape, 2, 2), dtype=np.complex128) for _ in range(2))
-            new[..., 0, :] = 1.0, -g
-            new[..., 1, 0], new[..., 1, 1] = -f * z, m
-            old[..., 0, :] = 1.0, 1 - g
-            old[..., 1, 0], old[..., 1, 1] = (1 - f) * z, m - 1
-            step = np.asarray(np.linalg.solve(new, old), np.complex128)
-        return np.asarray(np.abs(np.linalg.eigvals(step)).max(axis=-1))
-
-
-def method_of(scene: Scene) -> Method | None:
-    """The integrator that a dynamic scene runs with, if its waves are known to suffer from it; else None.
-
-    The exact propagation of the condensed engines does not touch waves, and ARKIMEX loses 1e-6 of them.
-    """
-    time = scene.time
-    if time.analysis != "dynamic" or scene.engine != "petsc" or time.adaptive:
-        return None
-    kind = time.integrator
-    if kind == "default":
-        return (
-            Method("theta", theta=0.5) if scene.drills else Method("generalized-alpha", rho_infinity=time.rho_infinity)
-        )
-    return Method(kind, time.order, time.theta, time.rho_infinity) if kind != "arkimex" else None
 
 
 # -- the string's own waves ------------------------------------------------------------------------------------------
@@ -189,9 +147,9 @@ def dying_waves(scene: Scene) -> Iterator[str]:
 
 def coarse_steps(scene: Scene) -> Iterator[str]:
     """Steps too long for the time between two blades."""
-    wanted = PASSAGE["petsc" if scene.engine == "petsc" else "condensed"]
     period, h = scene.blade_passage, scene.time.step
-    if scene.engine in PASSAGE and h > period / wanted * (1 + 1e-9):
+    wanted = PASSAGE.get(scene.engine)
+    if wanted is not None and h > period / wanted * (1 + 1e-9):
         yield (
             f"time.step = {h:g} s leaves {period / h:.3g} steps between two blades ({period:.4g} s), the "
             f"{scene.engine} engine wants {wanted}: take at most {period / wanted:.2g} s"
@@ -224,7 +182,7 @@ def locking(scene: Scene) -> Iterator[str]:
 def large_rotation(scene: Scene) -> Iterator[str]:
     """The trapezoidal rule where a rod turns as a whole: it has no damping for what it cannot resolve."""
     method = method_of(scene)
-    if scene.resolved_model().name not in ("planar", "spatial") or scene.drills:
+    if scene.resolved_model().name not in ("planar", "spatial") or scene.bites:
         return
     if method is None or method.kind != "theta" or method.theta != 0.5:
         return
@@ -385,6 +343,7 @@ GUARDS: tuple[Callable[[Scene], Iterator[str]], ...] = (
     drifting_quaternions,
     literal_torque,
     digging_bit,
+    *wall_guards.GUARDS,
 )
 
 

@@ -10,13 +10,13 @@ from ..compat import Array
 from ..errors import SimulationError
 from ..models.initial import initial_state
 from ..models.rod import Rod
-from ..models.steady import stretch_and_twist
+from ..models.steady import start_of_drilling, stretch_and_twist
 from .statics import Statics
 
 log = logging.getLogger("drillfem")
 
 #: Springs to the centreline that are let go one after the other, as multiples of the heaviest section's weight per
-#: length and metre of clearance: the first hold the string off the wall, the last ones no longer count.
+#: length (with what a pull at the tip presses in a bend) and metre of clearance: the first hold the string off the wall, the last ones no longer count.
 _SUPPORTS = (3e1, 3e0, 1e0, 3e-1, 1e-1, 3e-2, 1e-2, 1e-3, 1e-4, 0.0)
 
 
@@ -30,8 +30,7 @@ def along_hole(rod: Rod) -> Array:
     a, b, c, d = transported(frame.tangent).T
     cos, sin = np.cos(twist / 2), np.sin(twist / 2)
     q = np.stack([a * cos - d * sin, b * cos + c * sin, c * cos - b * sin, d * cos + a * sin], axis=1)
-    n = len(rod.ansatz.x_names)
-    x = np.empty((len(rod.nodes), n))
+    x = np.empty((len(rod.nodes), 7))
     x[rod.nodes] = np.hstack([frame.position, q])
     return x.reshape(-1)
 
@@ -59,12 +58,12 @@ def lay(rod: Rod) -> Array:
     scene, statics = rod.scene, Statics(rod)
     assert rod.wall is not None
     x = along_hole(rod)
-    n = len(rod.ansatz.x_names)
-    u = np.zeros((len(rod.nodes), rod.ansatz.size))
-    u[:, :n] = x.reshape(-1, n)
-    rod.wall.seek(u.reshape(-1))
-    rod.find_hole(u.reshape(-1))
+    u = statics.state(x)
+    rod.wall.seek(u)
+    rod.find_hole(u)
     weight = max(s.mass_per_length for s in scene.string) * scene.gravity.magnitude
+    # in a bend what pulls presses too
+    weight += float(np.linalg.norm(rod.tip_force.value)) * rod.wall.hole.sharpest()[0]
     clearance = max(float(rod.wall.gap), 1e-4)
     for support in _SUPPORTS:
         statics.support.value = support * weight / clearance
@@ -77,14 +76,13 @@ def lay(rod: Rod) -> Array:
             ) from None
         x = found.x.reshape(-1)
         log.debug("laid: support %.3g, %d iterations, gap %.3g m", support, found.newton_iterations, rod.wall.gap)
-    u[:, :n] = x.reshape(-1, n)
-    return u.reshape(-1)
+    return statics.state(x)
 
 
 def start_of(rod: Rod) -> Array:
     """Unknowns (dofs,) at the start of a run."""
     scene = rod.scene
-    if scene.initial.state != "laid" and not rod.bends:
+    if rod.wall is None or (scene.initial.state != "laid" and not rod.bends):
         return initial_state(rod)
     nominal, a = scene.nominal(), rod.ansatz
     drilling = scene.initial.state == "nominal" and rod.has_bit
@@ -95,6 +93,7 @@ def start_of(rod: Rod) -> Array:
         assert rod.wall is not None
         r = u[:, :3]
         tangent = rod.wall.hole.frame(rod.wall.hole.nearest(r)).tangent
-        u[:, [a.index(k) for k in ("v1", "v2", "v3")]] = nominal.rate_of_penetration * tangent
-        u[:, a.index("w3")] = scene.top_drive.speed or 0.0
+        speed, spin = start_of_drilling(scene, rod.arc_length)
+        u[:, [a.index(k) for k in ("v1", "v2", "v3")]] = speed * tangent
+        u[rod.nodes, a.index("w3")] = spin
     return u.reshape(-1)

@@ -42,7 +42,11 @@ static inline vec pick(mask m, vec a, vec b) { return (vec)(((mask)a & m) | ((ma
 EACH(sqrt)
 EACH(sin)
 EACH(cos)
+EACH(tan)
+EACH(atan)
 EACH(exp)
+EACH(log)
+EACH(tanh)
 EACH(fabs)
 
 static inline vec vec_pow(vec x, double n)
@@ -58,7 +62,11 @@ static inline vec vec_pow(vec x, double n)
 #define sqrt(x) vec_sqrt(VEC(x))
 #define sin(x) vec_sin(VEC(x))
 #define cos(x) vec_cos(VEC(x))
+#define tan(x) vec_tan(VEC(x))
+#define atan(x) vec_atan(VEC(x))
 #define exp(x) vec_exp(VEC(x))
+#define log(x) vec_log(VEC(x))
+#define tanh(x) vec_tanh(VEC(x))
 #define fabs(x) vec_fabs(VEC(x))
 #define fmax(x, y) pick(VEC(x) > VEC(y), VEC(x), VEC(y))
 #define fmin(x, y) pick(VEC(x) < VEC(y), VEC(x), VEC(y))
@@ -77,7 +85,7 @@ uintptr_t kernel_address(int number)
 DECLARATIONS = "uintptr_t kernel_address(int number);"
 
 #: Functions that have lanes, above.
-_KNOWN = {"sqrt", "sin", "cos", "exp", "fabs", "fmax", "fmin", "pow"}
+_KNOWN = {"sqrt", "sin", "cos", "tan", "atan", "exp", "log", "tanh", "fabs", "fmax", "fmin", "pow"}
 _INDENT, _TARGET = r"(\s*)", r"(\w+(?:\[[^=]*\])?)"
 #: Lines that are rewritten (a condition, a choice, an array, a number, an assignment), and lines that stay.
 _RULES = [

@@ -60,7 +60,8 @@ struct form {
     const int32_t *first;    /* (cells + 1): the actions of a cell are first[c] .. first[c + 1] */
     const struct action *actions;
     double *w, *c;           /* work: coefficients of an element, all constants */
-    uintptr_t lanes;         /* kernel with lanes of every cell, or 0 */
+    const uintptr_t *lanes;  /* kernels with lanes, for integrals over all cells */
+    int32_t n_lanes;
     int32_t width, entries;  /* numbers that it takes of an element, numbers that it makes */
     double *w_lanes, *x_lanes, *A_lanes; /* work, aligned for it */
 };
@@ -73,9 +74,6 @@ struct solver {
     const int32_t *node;     /* (n, d + 1): the same, as the unknowns count them */
     const uint8_t *held;     /* (dofs): rows that are replaced */
     int32_t check;           /* whether to make sure that the kinematic rows are those of their nodes */
-    int32_t n_extra;         /* entries to add besides the form, each within the block of a vertex of element `of` */
-    const int32_t *extra;    /* (n_extra, 3): e, row and column in its element matrix */
-    const double *extra_value;
     double *P, *D;           /* (nodes, nx, nx), (nodes, nv, nx) */
     double *K;               /* (n, (d+1) nv, (d+1) nv): elements without x */
     double *B;               /* (n, (d+1) nx, (d+1) nv): what f_x does to the rows of v */
@@ -84,7 +82,7 @@ struct solver {
     double *g, *z;           /* work: ((n + 1) nv), (n ni) */
 };
 
-void assemble_vector(const struct form *form, double *out, int32_t size);
+void assemble_vector(const struct form *form, double *out, int32_t size, const int32_t *some, int32_t n_some);
 double assemble_scalar(const struct form *form);
 int factorise(const struct solver *s, const struct form *form);
 void solve(const struct solver *s, const double *b, double *y);
@@ -147,36 +145,42 @@ static int run_lanes(const struct form *f, int cell)
             f->x_lanes[k * LANES + l] = f->geometry[6 * of + k];
     }
     memset(f->A_lanes, 0, sizeof(double) * f->entries * LANES);
-    ((kernel *)f->lanes)(f->A_lanes, f->w_lanes, f->c, f->x_lanes, &facet, NULL, NULL);
+    for (int i = 0; i < f->n_lanes; i++)
+        ((kernel *)f->lanes[i])(f->A_lanes, f->w_lanes, f->c, f->x_lanes, &facet, NULL, NULL);
     return count;
 }
 
-void assemble_vector(const struct form *f, double *out, int32_t size)
+/* Adds the vectors of `count` cells, which lie `stride` numbers apart in A */
+INLINE void scatter(const struct form *f, int cell, int count, const double *A, const int stride, double *out)
 {
     const int n = f->nodes, block = f->block;
-    double b[n * block];
+    for (int l = 0; l < count; l++)
+        for (int k = 0; k < n; k++) {
+            double *to = out + (int64_t)f->dofs[(cell + l) * n + k] * block;
+            const double *from = A + k * block * stride + l;
+            for (int i = 0; i < block; i++)
+                to[i] += from[i * stride];
+        }
+}
+
+/* Overwrites out (size); of the cells `some` alone, unless n_some = 0 */
+void assemble_vector(const struct form *f, double *out, int32_t size, const int32_t *some, int32_t n_some)
+{
+    const int cells = n_some ? n_some : f->cells;
+    double b[f->entries];
     memset(out, 0, size * sizeof(double));
     gather_constants(f);
-    for (int cell = 0; f->lanes && cell < f->cells; cell += LANES) {
-        const int count = run_lanes(f, cell);
-        for (int l = 0; l < count; l++)
-            for (int k = 0; k < n; k++) {
-                double *to = out + (int64_t)f->dofs[(cell + l) * n + k] * block;
-                const double *from = f->A_lanes + k * block * LANES + l;
-                for (int i = 0; i < block; i++)
-                    to[i] += from[i * LANES];
-            }
+    for (int i = 0; f->n_lanes && i < cells; i += n_some ? 1 : LANES) {
+        const int cell = n_some ? some[i] : i, count = run_lanes(f, cell);
+        scatter(f, cell, n_some ? 1 : count, f->A_lanes, LANES, out);
     }
-    for (int cell = 0; cell < f->cells; cell++) {
+    for (int i = 0; i < cells; i++) {
+        const int cell = n_some ? some[i] : i;
         if (f->first[cell] == f->first[cell + 1])
             continue;
         memset(b, 0, sizeof b);
         run(f, cell, b);
-        for (int k = 0; k < n; k++) {
-            double *to = out + (int64_t)f->dofs[cell * n + k] * block;
-            for (int i = 0; i < block; i++)
-                to[i] += b[k * block + i];
-        }
+        scatter(f, cell, 1, b, 1, out);
     }
 }
 
@@ -184,7 +188,7 @@ double assemble_scalar(const struct form *f)
 {
     double sum = 0.0;
     gather_constants(f);
-    for (int cell = 0; f->lanes && cell < f->cells; cell += LANES) {
+    for (int cell = 0; f->n_lanes && cell < f->cells; cell += LANES) {
         const int count = run_lanes(f, cell);
         for (int l = 0; l < count; l++)
             sum += f->A_lanes[l];
@@ -318,8 +322,8 @@ INLINE int factorise_sized(const struct solver *s, const struct form *f, const i
     memset(s->D, 0, sizeof(double) * nodes * nv * nx);
     memset(s->S, 0, sizeof(double) * (n + 1) * nv * nv);
     for (int cell = 0; cell < f->cells; cell += LANES) {
-        const int count = f->lanes ? run_lanes(f, cell) : f->cells - cell < LANES ? f->cells - cell : LANES;
-        if (f->lanes)
+        const int count = f->n_lanes ? run_lanes(f, cell) : f->cells - cell < LANES ? f->cells - cell : LANES;
+        if (f->n_lanes)
             for (int k = 0; k < N * N; k++)
                 for (int l = 0; l < LANES; l++)
                     A[l][k] = f->A_lanes[k * LANES + l];
@@ -328,9 +332,6 @@ INLINE int factorise_sized(const struct solver *s, const struct form *f, const i
         for (int l = 0; l < count; l++) {
             const int e = s->element[cell + l];
             run(f, cell + l, A[l]);
-            for (int k = 0; k < s->n_extra; k++)
-                if (s->extra[3 * k] == e)
-                    A[l][s->extra[3 * k + 1] * N + s->extra[3 * k + 2]] += s->extra_value[k];
             if (s->check && reach(A[l], nx, nv, d) > 1e-9)
                 return 1;
             split(s, e, A[l], s->K + (int64_t)e * nr * nr, s->B + (int64_t)e * nr * nxe, nx, nv, d);

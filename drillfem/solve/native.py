@@ -31,6 +31,12 @@ I4 = npt.NDArray[np.int32]
 _SOURCE = Path(__file__).with_name("native.c")
 
 
+@cache
+def _announce() -> None:
+    """Tell the user, once per process, why it takes a while."""
+    log.info("compiling loops, once")
+
+
 def _load(source: str, declarations: str) -> Any:
     """A compiled library: a module with ``lib`` and ``ffi``. Compiled once per source and processor."""
     options = jit_options()
@@ -40,6 +46,7 @@ def _load(source: str, declarations: str) -> Any:
     name, folder = f"drillfem_native_{key}", Path(options["cache_dir"])
     path = folder / (name + sysconfig.get_config_var("EXT_SUFFIX"))
     if not path.exists():
+        _announce()
         builder = cffi.FFI()
         builder.cdef(declarations)
         builder.set_source(name, source, extra_compile_args=arguments)
@@ -61,17 +68,23 @@ def library() -> Any:
     return _load(source, source.split("/* DECLARATIONS */")[1].split("/* END */")[0])
 
 
-def _kernel_with_lanes(form: dolfinx.fem.Form, number: int) -> tuple[int, Any]:
-    """Address of a kernel of a form rewritten to do several elements at once, and what keeps it alive; or 0."""
+def source_of(form: dolfinx.fem.Form) -> Path:
+    """The C file that a form was compiled from: FFCx leaves it beside its library."""
     library = Path(form.module.__file__)
-    code = library.with_name(library.name.split(".")[0] + ".c")
+    return library.with_name(library.name.split(".")[0] + ".c")
+
+
+def _kernels_with_lanes(form: dolfinx.fem.Form, numbers: list[int]) -> tuple[list[int], Any]:
+    """Addresses of kernels of a form rewritten to do several elements at once, and what keeps them alive; or none."""
+    code = source_of(form)
     try:
         text = code.read_text(encoding="utf-8")
-        module = _load(with_lanes(text, kernel_names(text)[number : number + 1]), DECLARATIONS)
+        names = kernel_names(text)
+        module = _load(with_lanes(text, [names[i] for i in numbers]), DECLARATIONS)
     except (OSError, ValueError, cffi.VerificationError) as error:
         log.debug("%s: no lanes (%s)", code, error)
-        return 0, None
-    return int(module.lib.kernel_address(0)), module
+        return [], None
+    return [int(module.lib.kernel_address(i)) for i in range(len(numbers))], module
 
 
 def _aligned(size: int) -> Array:
@@ -157,31 +170,39 @@ class _Form:
         c.constants, c.n_constants = constants, len(used)
         c.c = self._pointer(np.zeros(max(sum(value.value.size for value in used), 1)), "double *")
 
+    def _at(self, where: list[list[tuple[int, int]]], number: int, found: list[tuple[int, int]]) -> None:
+        """Have a kernel called for some cells and facets, one by one."""
+        kernel = self.form.ufcx_form.form_integrals[number].tabulate_tensor_float64
+        address = int(self.form.module.ffi.cast("uintptr_t", kernel))
+        for cell, facet in found:
+            where[cell].append((address, facet))
+
     def _actions(self, form: ufl.Form, compiled: Any, mesh: Any) -> None:
         ffi, c = self._ffi, self.c
         where: list[list[tuple[int, int]]] = [[] for _ in range(c.cells)]
         ((_, data),) = form.subdomain_data().items()
-        begins = compiled.form_integral_offsets
-        if begins[1] - begins[0] == 1 and compiled.form_integral_ids[begins[0]] == -1:
-            # the one integral over all cells
-            c.lanes, module = _kernel_with_lanes(self.form, begins[0])
-            self._keep.append(module)
+        begins, everywhere = compiled.form_integral_offsets, []
         for kind, name in ((0, "cell"), (1, "exterior_facet")):
-            if kind == 0 and c.lanes:
-                continue
             for i in range(begins[kind], begins[kind + 1]):
-                kernel = compiled.form_integrals[i].tabulate_tensor_float64
-                address = int(self.form.module.ffi.cast("uintptr_t", kernel))
-                for cell, facet in _entities(mesh, name, data[name][0], compiled.form_integral_ids[i]):
-                    where[cell].append((address, facet))
+                found = list(_entities(mesh, name, data[name][0], compiled.form_integral_ids[i]))
+                if kind == 0 and sorted(found) == [(cell, 0) for cell in range(c.cells)]:
+                    everywhere.append((i, found))
+                else:
+                    self._at(where, i, found)
+        addresses, module = _kernels_with_lanes(self.form, [i for i, _ in everywhere]) if everywhere else ([], None)
+        if not addresses:
+            for i, found in everywhere:
+                self._at(where, i, found)
+        lanes = ffi.new("uintptr_t[]", addresses or [0])
+        c.lanes, c.n_lanes = lanes, len(addresses)
+        self._keep += [lanes, module]
         actions = ffi.new("struct action[]", max(sum(map(len, where)), 1))
         for action, (address, facet) in zip(actions, (a for cell in where for a in cell), strict=False):
             action.kernel, action.facet = address, facet
         first = np.concatenate([[0], np.cumsum([len(cell) for cell in where])]).astype(np.int32)
-        lanes = self._lib.lanes()
         c.entries = (c.nodes * c.block) ** compiled.rank
         for work, size in (("w_lanes", c.width), ("x_lanes", 6), ("A_lanes", c.entries)):
-            setattr(c, work, self._pointer(_aligned(max(size, 1) * lanes), "double *"))
+            setattr(c, work, self._pointer(_aligned(max(size, 1) * self._lib.lanes()), "double *"))
         self._keep.append(actions)
         c.actions, c.first = actions, self._pointer(first, "int32_t *")
 
@@ -189,9 +210,20 @@ class _Form:
 class NativeVector(_Form):
     """A linear form; the like of :class:`drillfem.compat.VectorForm`."""
 
+    def __init__(self, form: ufl.Form, rod: Rod) -> None:
+        super().__init__(form, rod)
+        nodes = rod.V.dofmap.list
+        ends = np.flatnonzero(np.isin(nodes, rod.constrained // rod.ansatz.size).any(axis=1)).astype(np.int32)
+        self._ends, self._n_ends = self._pointer(ends, "int32_t *"), len(ends)
+
     def __call__(self, out: Array) -> Array:
         """Assemble into ``out`` (dofs), which is overwritten."""
-        self._lib.assemble_vector(self.c, self._ffi.from_buffer("double[]", out), out.size)
+        self._lib.assemble_vector(self.c, self._ffi.from_buffer("double[]", out), out.size, self._ffi.NULL, 0)
+        return out
+
+    def at_ends(self, out: Array) -> Array:
+        """Assemble; only the end conditions' rows of ``out`` are right."""
+        self._lib.assemble_vector(self.c, self._ffi.from_buffer("double[]", out), out.size, self._ends, self._n_ends)
         return out
 
 
@@ -205,11 +237,10 @@ class NativeScalar(_Form):
 class NativeSolver(_Form):
     """Factorises the Jacobian of a rod and solves with it: condensation to the vertices, a block tridiagonal system.
 
-    ``held``: dofs whose rows are unit rows. ``extra``: entries (row dof, column dof) to add besides the form, at a node
-    that is a vertex; their values (n,) go into ``extra_value``.
+    Rows of the rod's constrained dofs are unit rows. Raises ValueError where they are not velocities at its ends.
     """
 
-    def __init__(self, form: ufl.Form, rod: Rod, extra: npt.ArrayLike = ()) -> None:
+    def __init__(self, form: ufl.Form, rod: Rod) -> None:
         super().__init__(form, rod)
         ffi, a = self._ffi, rod.ansatz
         s = self.s = ffi.new("struct solver *")
@@ -226,13 +257,13 @@ class NativeSolver(_Form):
         node = np.take_along_axis(nodes[order], local, axis=1).astype(np.int32)
         held = np.zeros(rod.size, dtype=np.uint8)
         held[rod.constrained] = 1
-        if any(held.reshape(-1, block)[:, :nx].ravel()) or np.any(held.reshape(-1, block)[node[1:, 0]]):
+        where, what = np.divmod(rod.constrained, block)
+        if np.any(what < nx) or not np.isin(where, (node[0, 0], node[-1, 1])).all():
             raise ValueError("the compiled engine holds velocities at the ends only")
         s.n, s.d, s.nx, s.nv, s.check = n, d, nx, nv, 1
         s.element = self._pointer(element, "int32_t *")
         s.local, s.node = self._pointer(local, "int32_t *"), self._pointer(node, "int32_t *")
         s.held = self._pointer(held, "uint8_t *")
-        self._extra(np.asarray(extra, dtype=np.int64).reshape(-1, 2), node, local)
         inner, rows = (d - 1) * nv, (d + 1) * nv
         sizes = {
             "P": (n * d + 1) * nx * nx,
@@ -252,20 +283,6 @@ class NativeSolver(_Form):
             setattr(s, name, self._pointer(np.zeros(max(size, 1)), "double *"))
         self._y = np.zeros(rod.size)
         self._to = ffi.from_buffer("double[]", self._y)
-
-    def _extra(self, entries: npt.NDArray[np.int64], node: I4, local: I4) -> None:
-        block = self.c.block
-        found = np.zeros((len(entries), 3), dtype=np.int32)
-        for k, (row, column) in enumerate(entries.tolist()):
-            e, a = np.argwhere(node[:, :2] == row // block)[0]
-            if row // block != column // block:
-                raise ValueError("an extra entry couples two nodes")
-            first = local[e, a] * block
-            found[k] = e, first + row % block, first + column % block
-        self.extra_value: Array = np.zeros(max(len(entries), 1))
-        self.s.n_extra = len(entries)
-        self.s.extra = self._pointer(found, "int32_t *")
-        self.s.extra_value = self._pointer(self.extra_value, "double *")
 
     def factorise(self) -> None:
         """Assemble and factorise the Jacobian at the present values of its coefficients."""

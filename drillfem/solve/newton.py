@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from enum import Enum
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -26,12 +26,14 @@ from ..forms.ansatz import Spatial
 from ..models.rod import Rod
 
 #: Update below which an iteration has converged, in the unit of each component (m, 1, rad, m/s, rad/s).
-_TOLERANCE = {"r": 1e-9, "q": 1e-10, "t": 1e-10, "p": 1e-10, "v": 1e-8, "w": 1e-8}
+_TOLERANCE = {"r": 1e-9, "q": 1e-10, "t": 1e-10, "p": 1e-10, "v": 1e-8, "w": 1e-8, "h": 1e-9}
 _MAX_ITERATIONS = 25
 #: contraction above which the kept Jacobian is renewed for the next solve, and at once
 _SLOW, _STALLED = 0.1, 0.5
 #: iterations that a kept Jacobian may still need
 _PATIENCE = 5
+#: how often the multipliers of an augmented Lagrangian are moved in one solve
+_MOST_UPDATES = 50
 
 
 class BitLoad(Protocol):
@@ -60,6 +62,10 @@ class System(Protocol):
 
     def residual(self) -> Array:
         """F at the present x, shape (dofs,): a view, which may be overwritten. The rod takes the state of the stage."""
+        ...
+
+    def settle(self) -> None:
+        """Let the rod take the state of the stage at the present x, with its reactions."""
         ...
 
     def shift(self) -> float:
@@ -96,16 +102,16 @@ def _turns(reference: Array, now: Array, cosine: Array, sine: Array) -> None:
 
 
 @kernel()
-def _turn(y: Array, cosine: Array, sine: Array, way: float) -> None:
-    """Turn nodal blocks (r, q, v, w) of y (n, 13) about their own axis, in place; ``way`` = -1 is the inverse."""
+def _turn(y: Array, w: int, cosine: Array, sine: Array, way: float) -> None:
+    """Turn nodal blocks of y (n, entries) about their own axis; w: where the angular velocity is; way -1: back."""
     for i in range(len(y)):
         c, s = cosine[i], way * sine[i]
         q0, q1, q2, q3 = y[i, 3], y[i, 4], y[i, 5], y[i, 6]
         y[i, 3], y[i, 4] = q0 * c - q3 * s, q1 * c + q2 * s
         y[i, 5], y[i, 6] = q2 * c - q1 * s, q3 * c + q0 * s
         c2, s2 = c * c - s * s, 2 * c * s
-        w0, w1 = y[i, 10], y[i, 11]
-        y[i, 10], y[i, 11] = w0 * c2 + w1 * s2, w1 * c2 - w0 * s2
+        w0, w1 = y[i, w], y[i, w + 1]
+        y[i, w], y[i, w + 1] = w0 * c2 + w1 * s2, w1 * c2 - w0 * s2
 
 
 @kernel()
@@ -116,15 +122,63 @@ def _extrapolate(x1: Array, x2: Array, x3: Array, out: Array) -> None:
 
 
 @kernel()
-def _weighted(delta: Array, weight: Array) -> float:
-    """Largest |delta| in units of its tolerance."""
+def _update(
+    x: Array, y: Array, columns: Array, loads: tuple[float, float], w: int, cosine: Array, sine: Array, unit: Array
+) -> float:
+    """x -= T (y + columns . loads), T the turn; y (n,) becomes what is subtracted. Returns its largest entry in units.
+
+    columns (2, n), not used where both loads are 0; w: see :func:`_turn`, 0 for no turn; unit (entries per node,): one
+    over the tolerance of each.
+    """
+    for k in range(2):
+        if loads[k] != 0.0:
+            for i in range(len(y)):
+                y[i] += columns[k, i] * loads[k]
+    n = len(unit)
+    if w:
+        _turn(y.reshape((-1, n)), w, cosine, sine, 1.0)
     worst = 0.0
-    n = len(weight)
-    for i in range(len(delta)):
-        size = abs(delta[i]) * weight[i % n]
+    for i in range(len(y)):
+        x[i] -= y[i]
+        size = abs(y[i]) * unit[i % n]
         if not size <= worst:  # also catches nan
             worst = size
     return worst
+
+
+class _BitNode(NamedTuple):
+    """Where the motion of the bit stands in the vector of unknowns; ``turn``: the place of the quaternion or angle."""
+
+    depth: int
+    speed: int
+    spin: int
+    turn: int
+    quaternion: bool
+    bends: bool  # speed and depth are those along the hole: the third components are the ones named
+
+
+@kernel(lean=True)
+def _motion(
+    at: _BitNode, stage: Array, change: Array, factor: float, along: Array, c: float, s: float
+) -> tuple[float, float, float, float]:
+    """Change of depth, speed, turn and spin of the bit that belongs to ``factor`` times a change (n,) of a stage (n,).
+
+    along (3,): direction of a hole that bends. c, s: cosine and sine of the half angle by which the change is turned.
+    """
+    k = at.turn
+    if at.quaternion:
+        q0, q1, q2, q3 = change[k], change[k + 1], change[k + 2], change[k + 3]
+        q0, q1, q2, q3 = q0 * c - q3 * s, q1 * c + q2 * s, q2 * c - q1 * s, q3 * c + q0 * s
+        a, b, d, e = stage[k], stage[k + 1], stage[k + 2], stage[k + 3]
+        turn = 2 * (-e * q0 + d * q1 - b * q2 + a * q3) / (a * a + b * b + d * d + e * e)
+    else:
+        turn = change[k]
+    depth, speed = change[at.depth], change[at.speed]
+    if at.bends:
+        i, j = at.depth - 2, at.speed - 2
+        depth = change[i] * along[0] + change[i + 1] * along[1] + change[i + 2] * along[2]
+        speed = change[j] * along[0] + change[j + 1] * along[1] + change[j + 2] * along[2]
+    return factor * depth, factor * speed, factor * turn, factor * change[at.spin]
 
 
 def turn_between(rotation_from: Any, rotation_to: Any) -> float:
@@ -156,26 +210,22 @@ class BitCoupledNewton:
         self._factored_shift = 0.0
         self._renew = True
         self._contraction = 1.0
-        self._turning = keep and isinstance(rod.ansatz, Spatial)
+        #: where the angular velocity stands in a node's block, of an ansatz that turns (else 0)
+        self._turning = rod.ansatz.index("w1") if keep and isinstance(rod.ansatz, Spatial) else 0
         self._stage, self._load = rod.u.x.array, rod.bit_load
         names = rod.ansatz.x_names + rod.ansatz.v_names
-        self._weight = np.array([1.0 / _TOLERANCE[name[0]] for name in names])
+        self._unit = np.array([1.0 / _TOLERANCE[name[0]] for name in names])
         n = rod.size // rod.ansatz.size
         self._cosine, self._sine = np.ones(n), np.zeros(n)
         self._reference = np.zeros((n, 4))
         self._columns = np.zeros((2, rod.size))
         self._compliance = (0.0, 0.0, 0.0, 0.0)
         if bit is not None:
-            size, at = rod.ansatz.size, rod.bit
-            self._bit_number = int(rod.nodes[-1])
-            first = self._bit_number * size
-            self._bit_node = slice(first, first + size)
-            turn = (
-                slice(at.rotation.start - first, at.rotation.stop - first)
-                if isinstance(at.rotation, slice)
-                else at.rotation - first
-            )
-            self._bit_at = (turn, at.depth - first, at.speed - first, at.spin - first)
+            at, self._bit_number = rod.bit, int(rod.nodes[-1])
+            quaternion = isinstance(at.rotation, slice)
+            turn = at.rotation.start if isinstance(at.rotation, slice) else at.rotation
+            self._rotation = at.rotation
+            self._bit_at = _BitNode(at.depth, at.speed, at.spin, turn, quaternion, rod.bends)
         self._history: list[Array] = []
 
     def forget(self) -> None:
@@ -184,12 +234,12 @@ class BitCoupledNewton:
         self._history.clear()
 
     def _quaternions(self) -> Array:
-        return self._stage.reshape(-1, 13)[:, 3:7]
+        return self._stage.reshape(len(self._cosine), -1)[:, 3:7]
 
     def _solve_kept(self, system: System, b: Array) -> Array:
         """J0^-1 T^-1 b: the kept Jacobian, in the frame in which it was factorised; overwrites b."""
         if self._turning:
-            _turn(b.reshape(-1, 13), self._cosine, self._sine, -1.0)
+            _turn(b.reshape(len(self._cosine), -1), self._turning, self._cosine, self._sine, -1.0)
         return system.solve(b)
 
     def _factorise(self, system: System) -> None:
@@ -204,39 +254,25 @@ class BitCoupledNewton:
             for column, load in zip(self._columns, self.rod.bit_load_vectors(), strict=True):
                 column[:] = self._solve_kept(system, load)
             # a turn of the sections about their axis leaves these four numbers as they are
-            depth, speed, _, _ = self._motion(self._columns[0][self._bit_node])
-            _, _, turn, spin = self._motion(self._columns[1][self._bit_node])
+            by_weight, by_torque = (
+                _motion(self._bit_at, self._stage, column, 1.0, self.rod.bit_tangent, 1.0, 0.0)
+                for column in self._columns
+            )
+            depth, speed, _, _ = by_weight
+            _, _, turn, spin = by_torque
             self._compliance = (speed, depth, spin, turn)
-
-    def _motion(self, change: Array) -> tuple[float, float, float, float]:
-        """Change of depth, speed, turn and spin of the bit that belongs to a change of its node."""
-        turn, depth, speed, spin = self._bit_at
-        if isinstance(turn, slice):
-            a, b, c, d = self._stage[self._bit_node][turn]
-            p, q, r, s = change[turn]
-            angle = 2 * (-d * p + c * q - b * r + a * s) / (a * a + b * b + c * c + d * d)
-        else:
-            angle = change[turn]
-        if self.rod.bends:  # along the hole
-            along, names = self.rod.bit_tangent, self.rod.ansatz
-            v = names.index("v1")
-            return float(change[:3] @ along), float(change[v : v + 3] @ along), float(angle), float(change[spin])
-        return float(change[depth]), float(change[speed]), float(angle), float(change[spin])
 
     def _condense(self, y: Array, part: float) -> tuple[float, float]:
         """Solve the bit problem on the linearised string; returns the change of weight and torque."""
         assert self.bit is not None
-        turn = self._bit_at[0]
-        stage = self._stage[self._bit_node]
-        change = -part * y[self._bit_node]
-        if self._turning:
-            node = self._bit_number
-            _turn(change[None, :], self._cosine[node : node + 1], self._sine[node : node + 1], 1.0)
-        d_depth, d_speed, d_turn, d_spin = self._motion(change)
+        node, stage = self._bit_number, self._stage
+        d_depth, d_speed, d_turn, d_spin = _motion(
+            self._bit_at, stage, y, -part, self.rod.bit_tangent, self._cosine[node], self._sine[node]
+        )
         g_speed, g_depth, g_spin, g_turn = self._compliance
         weight, torque = float(self._load[0]), float(self._load[1])
-        angle = turn_between(self.start_rotation, stage[turn])
-        now_depth, now_speed, now_spin = self.rod.end_motion(self._stage)
+        angle = turn_between(self.start_rotation, stage[self._rotation])
+        now_depth, now_speed, now_spin = self.rod.end_motion(stage)
         new_weight, new_torque = self.bit.respond(
             now_speed + d_speed + g_speed * weight,
             g_speed,
@@ -250,16 +286,36 @@ class BitCoupledNewton:
         return new_weight - weight, new_torque - torque
 
     def solve(self, system: System, x: Array) -> Outcome:
-        """Newton iterations from the extrapolated start; ``x`` (dofs,) are the unknowns of ``system``, in place."""
-        rod, bit = self.rod, self.bit
+        """Newton iterations from the extrapolated start; ``x`` (dofs,) are the unknowns of ``system``, in place.
+
+        With an augmented Lagrangian the wall's multipliers are moved and the iteration goes on, until they hold.
+        """
+        rod = self.rod
         if self.extrapolate and len(self._history) == 3:
             x1, x2, x3 = self._history
             _extrapolate(x1, x2, x3, x)
+        load, there = self._load.copy(), rod.there()
+        outcome = self._iterate(system, x)
+        for _ in range(_MOST_UPDATES):
+            if outcome is not Outcome.CONVERGED or not rod.augment(system.shift()):
+                break
+            outcome = self._iterate(system, x)
+        else:
+            outcome = Outcome.SLOW
+        if outcome is Outcome.CONVERGED:
+            self._history = [x.copy(), *self._history[:2]]
+        else:
+            self.forget()
+            rod.set_bit_load(*load)
+            rod.go_back(there)
+        return outcome
+
+    def _iterate(self, system: System, x: Array) -> Outcome:
+        rod, bit = self.rod, self.bit
         outcome = Outcome.SLOW
         previous, renew_after, keep = np.inf, False, self.keep
         # where to go back to when a kept Jacobian leads astray: behind the last update that can be trusted
         trusted, trusted_load, first = x.copy(), self._load.copy(), True
-        load = trusted_load.copy()
         for iteration in range(_MAX_ITERATIONS):
             f = system.residual()
             if iteration == 0 and abs(system.shift() - self._factored_shift) > 1e-10 * system.shift():
@@ -271,18 +327,15 @@ class BitCoupledNewton:
             elif self._turning and iteration == 0:
                 _turns(self._reference, self._quaternions(), self._cosine, self._sine)
             y = self._solve_kept(system, f)
-            part = system.stage_fraction
+            loads = (0.0, 0.0)
             if bit is not None:
+                part = system.stage_fraction
                 d_weight, d_torque = self._condense(y, part)
-                y += self._columns[0] * (d_weight / part)
-                y += self._columns[1] * (d_torque / part)
+                loads = (d_weight / part, d_torque / part)
                 rod.set_bit_load(self._load[0] + d_weight, self._load[1] + d_torque)
-            if self._turning:
-                _turn(y.reshape(-1, 13), self._cosine, self._sine, 1.0)
-            x -= y
+            size = _update(x, y, self._columns, loads, self._turning, self._cosine, self._sine, self._unit)
             self.iterations += 1
-            size = _weighted(y, self._weight)
-            if not np.isfinite(size):
+            if not math.isfinite(size):
                 outcome = Outcome.NAN
                 break
             if not first:
@@ -308,17 +361,12 @@ class BitCoupledNewton:
                 rate = min(1.0, 4 * self._contraction) if first else self._contraction
             if size < 1.0 or (rate < 0.5 and size * rate / (1 - rate) < 1.0):
                 outcome = Outcome.CONVERGED
-                # reactions and powers are read from the state that the residual has seen last
+                # reactions and powers are read from the state that the rod has seen last
                 if size > 1.0:
-                    system.residual()
+                    system.settle()
                 break
             if fresh or not first:
                 trusted[:], trusted_load[:] = x, self._load
             previous, first = size, False
         self._renew = self._renew or renew_after
-        if outcome is Outcome.CONVERGED:
-            self._history = [x.copy(), *self._history[:2]]
-        else:
-            self.forget()
-            rod.set_bit_load(*load)
         return outcome

@@ -22,13 +22,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..bitrock.jit import announce, kernel
-from ..errors import SimulationError
+from ..errors import SceneError, SimulationError
 from ..models.drive import DriveLaw, law_of, slip, wanted
 from ..models.soft_string import COULOMB, WallFriction, line_of, wall_friction
 from ..models.steady import outer_diameter
@@ -46,6 +47,8 @@ TRAVEL_TIME = 2e-4
 """Relative error of a section's travel time that is good enough."""
 STEEPEST = 0.5
 """Greatest fall of the friction torque at a node, over the impedance that stands against it."""
+FINER = 64
+"""How much finer than asked for the grid may be made for that."""
 
 OUTPUTS = (
     "time",
@@ -105,14 +108,19 @@ def _rub(rules: Rules, node: F8, spin: float) -> float:
 
 
 @kernel(lean=True)
-def _turn(rules: Rules, node: F8, resist: float, push: float, before: float):  # type: ignore[no-untyped-def]
-    """Spin w of a node with ``resist`` w + T(w) = ``push``, and dw/dpush; ``before``: its spin in the last step."""
+def _turn(rules: Rules, node: F8, resist: float, push: float, before: float, guess: float):  # type: ignore[no-untyped-def]
+    """Spin w of a node with ``resist`` w + T(w) = ``push``, and dw/dpush.
+
+    ``before``: its spin in the last step; ``guess``: what it may be.
+    """
+    if node[STATIC] == 0.0:
+        return push / resist, 1.0 / resist
     size, sign = abs(push), math.copysign(1.0, push)
     if rules.coulomb:
         slack = size - (node[STATIC] if abs(before) < rules.threshold else node[DYNAMIC])
         return (sign * slack / resist, 1.0 / resist) if slack >= 0.0 else (0.0, 0.0)
     low, high = 0.0, size / resist
-    w = min(max(sign * before, low), high)
+    w = min(max(sign * guess, low), high)
     slope = resist
     for _ in range(_MOST):
         torque, slope = _stribeck(rules, node, w)
@@ -135,7 +143,7 @@ def _turn(rules: Rules, node: F8, resist: float, push: float, before: float):  #
 @kernel(lean=True)
 def _top(  # type: ignore[no-untyped-def]
     rules: Rules, law: DriveLaw, node: F8, resist: float, push: float, before: float, error: float, turned: float,
-    speed: float, step: float,
+    speed: float, guess: float, step: float,
 ):  # fmt: skip
     """Spin of a driven top over the step, its slope by ``push``, and the torque of the motor.
 
@@ -145,21 +153,23 @@ def _top(  # type: ignore[no-untyped-def]
     soft = law.proportional + 0.5 * step * law.integral
     heavy = law.inertia / step if law.masks > 0.0 else 2.0 * law.inertia / step
     own = 0.0 if law.masks > 0.0 else heavy
-    w, slope = _turn(rules, node, resist + soft + own, push + asked + own * before, speed)
+    w, slope = _turn(rules, node, resist + soft + own, push + asked + own * before, speed, guess)
     torque = asked - soft * w + law.masks * heavy * (w - before)
     if abs(torque) > law.limit:
         torque = math.copysign(law.limit, torque)
-        w, slope = _turn(rules, node, resist + heavy, push + torque + heavy * before, speed)
+        w, slope = _turn(rules, node, resist + heavy, push + torque + heavy * before, speed, guess)
     return w, slope, torque
 
 
 @kernel(lean=True)
-def _bottom(rules: Rules, node: F8, resist: float, push: float, before: float, speed: float, step: float):  # type: ignore[no-untyped-def]
+def _bottom(  # type: ignore[no-untyped-def]
+    rules: Rules, node: F8, resist: float, push: float, before: float, speed: float, guess: float, step: float
+):
     """Spin of the bottom over the step, and its slope by ``push``."""
     if rules.held:
         return 0.0, 0.0
     heavy = 2.0 * rules.bottom_inertia / step
-    return _turn(rules, node, resist + heavy, push + heavy * before, speed)
+    return _turn(rules, node, resist + heavy, push + heavy * before, speed, guess)
 
 
 @kernel(lean=True)
@@ -187,12 +197,22 @@ def _solve(  # type: ignore[no-untyped-def]
                     found, slope = turned / step, 0.0
                 else:
                     found, slope, torque = _top(
-                        rules, law, nodes[0], resist, push[0] + beside, s[TOP_SPEED], s[ERROR], turned, old[0], step
+                        rules,
+                        law,
+                        nodes[0],
+                        resist,
+                        push[0] + beside,
+                        s[TOP_SPEED],
+                        s[ERROR],
+                        turned,
+                        old[0],
+                        w[0],
+                        step,
                     )
             elif i == n - 1:
-                found, slope = _bottom(rules, nodes[i], resist, push[i] + beside, s[BIT_SPEED], old[i], step)
+                found, slope = _bottom(rules, nodes[i], resist, push[i] + beside, s[BIT_SPEED], old[i], w[i], step)
             else:
-                found, slope = _turn(rules, nodes[i], resist, push[i] + beside, old[i])
+                found, slope = _turn(rules, nodes[i], resist, push[i] + beside, old[i], w[i])
             if not rules.damped:
                 w[i] = found
                 continue
@@ -293,6 +313,11 @@ def _march(
         for j in range(n - 1):
             a, b = down[j], up[j]
             down[j], up[j] = w[j] - b, w[j + 1] - a
+            if w[j] == 0.0 and w[j + 1] == 0.0 and nodes[j, STATIC] > 0.0 and nodes[j + 1, STATIC] > 0.0:
+                # stuck at both ends: friction along the cell stops what would bounce in it for ever
+                wall += 0.5 * impedance[j] * (a + b) ** 2
+                up[j] = 0.5 * (b - a)
+                down[j] = -up[j]
         # the ends: what the wall takes there is the rest of their balance
         stored = 0.5 * rules.top_inertia * s[TOP_SPEED] ** 2
         if rules.imposed:
@@ -349,12 +374,36 @@ def _march(
     return -1
 
 
+def merged(shafts: Sequence[Shaft], damping: Sequence[float], shortest: float) -> tuple[list[Shaft], F8]:
+    """Sections with those joined to their neighbours that a wave passes in less than ``shortest`` (s), and equal ones.
+
+    The joined section is as long, as soft and as heavy as its parts, and damps as much under the same torque: waves
+    longer than it do not see the difference. Returns shafts and their Kelvin-Voigt times (s).
+    """
+    found: list[Shaft] = []
+    late: list[float] = []
+    for shaft, c in zip(shafts, damping, strict=True):
+        if found:
+            one = found[-1]
+            same = (one.stiffness, one.inertia, late[-1]) == (shaft.stiffness, shaft.inertia, c)
+            if same or min(one.travel_time, shaft.travel_time) < shortest:
+                length = one.length + shaft.length
+                soft = one.length / one.stiffness, shaft.length / shaft.stiffness
+                heavy = one.length * one.inertia + shaft.length * shaft.inertia
+                late[-1] = c if same else (late[-1] * soft[0] + c * soft[1]) / sum(soft)
+                found[-1] = replace(shaft, length=length) if same else Shaft(length, length / sum(soft), heavy / length)
+                continue
+        found.append(shaft)
+        late.append(c)
+    return found, np.array(late)
+
+
 class SoftString:
     """A soft string, marched along its waves.
 
     Parameters
     ----------
-    shafts : sections from the top down.
+    shafts : sections from the top down; shorter ones than a wave passes in ``step`` are joined (`merged`).
     friction : at the wall.
     step : s, of the outputs.  Inside, steps are at most as long (`internal_step`), divide the travel times of the
         sections to `TRAVEL_TIME` (`travel_time_error`), and make ``cells`` or more of them; outputs lie on straight
@@ -365,7 +414,7 @@ class SoftString:
     held : the lower end does not turn.
     damping : Kelvin-Voigt times c_d (s) of the sections.
 
-    Raises ValueError for a step that is not positive.
+    Raises ValueError for a step that is not positive, SceneError for friction that falls too fast with speed.
     """
 
     def __init__(
@@ -384,15 +433,23 @@ class SoftString:
     ) -> None:
         if not step > 0:
             raise ValueError(f"soft string: step = {step}: must be > 0")
-        self.shafts, self.friction, self.step, self._reference = tuple(shafts), friction, float(step), top
-        self._damping = np.array(damping if len(damping) else [0.0] * len(self.shafts))
+        self.friction, self.step, self._reference = friction, float(step), top
+        self.shafts, self._damping = merged(shafts, damping or [0.0] * len(shafts), step)
         inertia = law.inertia if law is not None else top_inertia
         self.driven = law is not None
         self._law = law or DriveLaw(0.0, 0.0, math.inf, inertia, 0.0)
         times = [x.travel_time for x in self.shafts]
         longest = min(step, math.fsum(times) / cells)
-        while not self._lay(longest):
+        finest = longest / FINER
+        while (steep := self._lay(longest)) > STEEPEST:
             longest /= 2
+            if longest < finest:
+                most = friction.velocity_scale * STEEPEST / steep
+                raise SceneError(
+                    f"contact.friction_velocity_scale = {friction.velocity_scale:g}: must be at most {most:.3g} for "
+                    f"time.step = {step:g} s, or friction falls faster with speed than the string can follow; "
+                    "soft_string.law = 'coulomb' is the limit of a large one"
+                )
         self._rules = Rules(
             friction.law == COULOMB,
             friction.threshold,
@@ -405,8 +462,8 @@ class SoftString:
         )
         self.reset()
 
-    def _lay(self, longest: float) -> bool:
-        """Lay the grid with steps of at most ``longest`` (s); returns whether the nodes have one solution on it."""
+    def _lay(self, longest: float) -> float:
+        """Lay the grid with steps of at most ``longest`` (s); returns how fast friction falls, over the impedance."""
         dt, counts, self.travel_time_error = wave_step([x.travel_time for x in self.shafts], longest, TRAVEL_TIME)
         self.internal_step = dt
         impedance, size, late = (
@@ -432,7 +489,7 @@ class SoftString:
         node = np.clip(np.searchsorted(s[:-1] + size / 2, at), 0, n)
 
         def gather(values: F8) -> F8:
-            return np.bincount(node, weight * values, n + 1)
+            return np.asarray(np.bincount(node, weight * values, n + 1), np.float64)
 
         static, dynamic = friction.torque(at)
         nodes = np.zeros((n + 1, 6))
@@ -442,44 +499,49 @@ class SoftString:
         nodes[:, DRAG] = gather(friction.drag(at))
         nodes[:-1, RESIST] += impedance
         nodes[1:, RESIST] += impedance
-        steep = (nodes[:, PEAK] * nodes[:, SCALE] / 8 / nodes[:, RESIST]).max()
+        steep = 0.0 if friction.law == COULOMB else (nodes[:, PEAK] * nodes[:, SCALE] / 8 / nodes[:, RESIST]).max()
         nodes[:, RESIST] += nodes[:, DRAG]
         self._nodes = nodes
-        return friction.law == COULOMB or bool(steep <= STEEPEST)
+        return float(steep)
 
     # -- state ------------------------------------------------------------------------------------------------
-    def reset(self, spin: float = 0.0) -> None:
-        """Start at time 0: the whole string turns with ``spin`` (rad/s), twisted by friction at that spin; or rests.
+    def reset(self, spin: float | F8 = 0.0) -> None:
+        """Start at time 0.
 
-        The drive is in balance with it; at rest nothing is twisted.
+        spin: of the whole string (rad/s), which friction at that spin has twisted, with the drive in balance; 0: at
+        rest, without twist. Or spins (n,) at the nodes, of a string without twist.
         """
         n = len(self._impedance)
         s = self._s = np.zeros(11)
-        self._w = np.full(n + 1, spin)
-        taken = np.array([self._rubbing(i, spin) for i in range(n + 1)]) if spin else np.zeros(n + 1)
-        moment = -np.cumsum(taken[::-1])[::-1]
-        b_less_a = moment[1:] / self._impedance
-        self._down, self._up = (spin - b_less_a) / 2, (spin + b_less_a) / 2
-        s[TOP_SPEED], s[BIT_SPEED] = spin, 0.0 if self._rules.held else spin
-        if self._law.integral > 0:
-            missing = float(self._reference(np.zeros(1))[1][0]) - spin
-            s[ERROR] = (-moment[0] - self._law.proportional * missing) / self._law.integral if spin else 0.0
-        self.count = self._node = 0
-        _energies(self._impedance, self._down, self._up, s, self._rules, self.internal_step)
-        row = np.zeros(len(OUTPUTS))
+        self._w = np.array(np.broadcast_to(spin, n + 1), np.float64)
+        start = float(self._w[0])
+        moment: F8 = np.zeros(n + 1)
+        turning = np.ndim(spin) == 0 and start != 0.0
+        if turning:
+            taken = [self._rubbing(i, start) + self._nodes[i, DRAG] * start for i in range(n + 1)]
+            moment = -np.cumsum(taken[::-1])[::-1]
+        mean, b_less_a = (self._w[1:] + self._w[:-1]) / 2, moment[1:] / self._impedance
+        self._down, self._up = (mean - b_less_a) / 2, (mean + b_less_a) / 2
+        s[TOP_SPEED], s[BIT_SPEED] = start, 0.0 if self._rules.held else self._w[-1]
         law, rules = self._law, self._rules
         asked = float(self._reference(np.zeros(1))[1][0])
         torque = -float(moment[0])
-        if self.driven and not spin:
-            torque = float(np.clip(wanted(law, 0.0, asked, 0.0), -law.limit, law.limit))
-        row[1:4] = torque, asked if rules.imposed else spin, s[BIT_SPEED]
-        row[5], row[6], row[7], row[12] = row[1] * row[2], s[KINETIC], s[STRAIN], taken.sum()
+        if self.driven and turning and law.integral > 0:
+            s[ERROR] = (torque - law.proportional * (asked - start)) / law.integral
+        elif self.driven:
+            torque = float(np.clip(wanted(law, 0.0, asked - start, 0.0), -law.limit, law.limit))
+        self.count = self._node = 0
+        _energies(self._impedance, self._down, self._up, s, rules, self.internal_step)
+        row = np.zeros(len(OUTPUTS))
+        row[1:4] = torque, asked if rules.imposed else start, s[BIT_SPEED]
+        row[5], row[6], row[7] = row[1] * row[2], s[KINETIC], s[STRAIN]
+        self._rub = np.array([self._rubbing(i, w) for i, w in enumerate(self._w)])
+        row[12] = self._rub.sum()
         self._hold = np.stack([row, row])
         self._seen, self._moment = np.stack([self._w] * 2), np.stack([moment[1:]] * 2)
-        self._rub = taken
 
     def _rubbing(self, i: int, spin: float) -> float:
-        return float(_rub(self._rules, self._nodes[i], spin) + self._nodes[i, DRAG] * spin)
+        return float(_rub(self._rules, self._nodes[i], spin))
 
     @property
     def time(self) -> float:
@@ -633,12 +695,14 @@ class SoftStringRun:
         #: force on the wall per length (n,) at the nodes, N/m, and all of it, N
         self.side_load = self.line.side_load(s, scene.soft_string.side_load)
         self.side_force = float(np.trapezoid(self.side_load, s))
+        self._frame = self.line.hole.frame(s)
+        self._sideways = _across(self._frame.tangent)
 
     def history(self, rows: dict[str, Any]) -> tuple[F8, dict[str, F8]]:
         """Times (n,) and history arrays (n,) from the engine's rows; updates the error of the energy balance."""
         rows = {name: np.atleast_1d(values) for name, values in rows.items()}
         still = np.zeros_like(rows["time"])
-        rows |= {name: still for name in ("work_gravity", "work_hook_load", "work_bit", "bit_axial_speed")}
+        rows |= dict.fromkeys(("work_gravity", "work_hook_load", "work_bit", "bit_axial_speed"), still)
         rows["hook_load"] = still + float(self.line.hanging(np.zeros(1))[0])
         rows["side_force"] = still + self.side_force
         stored = rows["kinetic_energy"] + rows["strain_energy"]
@@ -648,9 +712,8 @@ class SoftStringRun:
 
     def fields(self) -> dict[str, F8]:
         """Fields along the string now: it lies on the axis of its hole."""
-        s, found = self.string.arc_length, self.string.fields()
-        frame = self.line.hole.frame(s)
-        first, second = _across(frame.tangent)
+        s, found, frame = self.string.arc_length, self.string.fields(), self._frame
+        first, second = self._sideways
         angle, none = found["angle"][:, None], np.zeros(len(s))
         return {
             "arc_length": s,
@@ -691,7 +754,7 @@ def _across(tangent: F8) -> tuple[F8, F8]:
             old = tangent[i - 1]
             here = here - (here @ t) / (1.0 + old @ t) * (old + t)
         first[i] = here = here / np.linalg.norm(here)
-    return first, np.cross(tangent, first)
+    return first, np.asarray(np.cross(tangent, first), np.float64)
 
 
 def run_soft_string(

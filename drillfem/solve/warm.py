@@ -10,11 +10,13 @@ from .run import simulate
 #: A short run of each of these touches every kernel that the built-in scenes need.
 _RUNS: tuple[tuple[str, dict[str, object], float | None], ...] = (
     ("vertical-c1-cd4", {"model": "spatial"}, 0.003),
+    ("vertical-c1-cd4", {"model": "spatial", "time.engine": "compiled"}, 0.003),
     ("vertical-c1-cd4", {"model": "axial-torsional", "time.engine": "petsc"}, 0.003),
     ("vertical-c1-cd4", {"model": "axial-torsional"}, 0.003),
     ("cutting-c1", {}, 0.003),
     ("cutting-c1", {"time.engine": "characteristics", "rock.surface.scheme": "supg"}, 0.003),
     ("vertical-v1", {}, 0.003),
+    ("off-bottom-soft-string", {}, 0.01),
     ("spin-up", {}, 0.01),
     ("pendulum", {}, 0.01),
     ("roll-up", {}, None),

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import SceneError
+from ..errors import SceneError, SimulationError
 from ..models.soft_string import Line, line_of
 from ..results.atomic import replacing, write_json
 from ..results.manifest import check_new_folder
 from ..scene.units import to_si
 from .limits import limits
-from .operation import OPERATIONS, Profile, deepest, operations_of
+from .operation import F8, OPERATIONS, Operation, Profile, deepest, operations_of
 from .report import Broomstick, Study, buckling_text, dataset, draw, print_table, write_csv
 from .soft import greatest_weight, hook_loads, lock_up_depth, soft_string, stations
 
@@ -23,11 +22,11 @@ if TYPE_CHECKING:
 
     from ..scene import Scene
 
-METHODS = ("soft", "stations")
+METHODS = ("soft", "stations", "stiff")
 _TRIPS = ("rotating", "tripping-out", "tripping-in")
 
 
-def _load(text: str | None, unit: str, option: str) -> float | None:
+def load_of(text: str | None, unit: str, option: str) -> float | None:
     """A load such as ``50 kN`` or ``50000`` in SI units, not negative. Raises SceneError."""
     if text is None:
         return None
@@ -68,17 +67,35 @@ def study(
     for method in methods or METHODS[:1]:
         if method == "soft":
             profiles[method] = [soft_string(line, o, friction=friction, buckled=buckled) for o in wanted]
-        else:
+        elif method == "stations":
             profiles[method] = [stations(line, o, friction=friction) for o in wanted]
-    depths = np.linspace(0.02 * line.length, line.length, 50)
+        else:
+            profiles[method] = _stiff(scene, wanted, friction, notes)
+    depths: F8 = np.linspace(0.02 * line.length, line.length, 50, dtype=np.float64)
     sticks = [
-        Broomstick(o.name, depths, hook_loads(line, replace(o), depths, friction=friction, buckled=buckled))
+        Broomstick(o.name, depths, hook_loads(line, o, depths, friction=friction, buckled=buckled))
         for o in wanted
         if o.name in _TRIPS
     ]
     notes += _lock_up(line, [o.name for o in wanted], friction, buckled)
     found = limits(line, next(iter(profiles.values()))[0].measured_depth)
     return Study(scene.title, line, profiles, found, sticks, notes)
+
+
+def _stiff(scene: Scene, wanted: list[Operation], friction: str, notes: list[str]) -> list[Profile]:
+    """The rod's profiles; where it finds no equilibrium, one of nan and a note."""
+    from .stiff import sliding_string  # DOLFINx and PETSc
+
+    sliding, laid = sliding_string(scene, friction)
+    found: list[Profile] = []
+    for operation in wanted:
+        try:
+            found.append(sliding.operate(laid, operation))
+        except SimulationError as error:
+            notes.append(f"stiff string, {error}")
+            none = np.full(2, np.nan)
+            found.append(Profile("stiff", operation, np.array([0.0, scene.length]), none, none, none))
+    return found
 
 
 def _lock_up(line: Line, names: list[str], friction: str, buckled: bool) -> list[str]:
@@ -96,6 +113,11 @@ def _lock_up(line: Line, names: list[str], friction: str, buckled: bool) -> list
     return notes
 
 
+def _number(value: float) -> float | None:
+    """What JSON can carry."""
+    return None if np.isnan(value) else value
+
+
 def run(
     scene: Scene,
     out: Path,
@@ -109,8 +131,8 @@ def run(
 ) -> Study:
     """Compute, print the table, and write ``torque-drag.csv``, ``.nc``, ``.png`` and ``.json`` into ``out``."""
     check_new_folder(out)
-    weight = _load(weight_on_bit, "N", "--weight-on-bit")
-    torque = _load(torque_on_bit, "N m", "--torque-on-bit")
+    weight = load_of(weight_on_bit, "N", "--weight-on-bit")
+    torque = load_of(torque_on_bit, "N m", "--torque-on-bit")
     found = study(scene, operations, methods, weight, torque, friction, buckled)
     out.mkdir(parents=True, exist_ok=True)
     print_table(found, console)
@@ -131,9 +153,9 @@ def run(
                     "operation": p.operation.name,
                     "weight_on_bit": p.operation.weight_on_bit,
                     "torque_on_bit": p.operation.torque_on_bit,
-                    "hook_load": p.hook_load,
-                    "surface_torque": p.surface_torque,
-                    "largest_side_force": deepest(p, p.side_force)[0],
+                    "hook_load": _number(p.hook_load),
+                    "surface_torque": _number(p.surface_torque),
+                    "largest_side_force": _number(deepest(p, p.side_force)[0]),
                     "largest_side_force_at": deepest(p, p.side_force)[1],
                     "buckling": buckling_text(p, found.limits),
                 }

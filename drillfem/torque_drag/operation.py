@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -86,20 +84,12 @@ def operations_of(
     for name in names or ():
         if name not in OPERATIONS:
             raise SceneError(f"--operation {name!r}: must be one of {', '.join(OPERATIONS)}")
-    steady, bit = scene.nominal(), scene.bit
-    weight = weight_on_bit if weight_on_bit is not None else scene.top_drive.weight_on_bit
-    if weight is None and scene.bites and scene.top_drive.hook_load is not None:
-        weight = steady.weight_on_bit if scene.drills else scene.weight - scene.top_drive.hook_load
-    torque = torque_on_bit
-    if torque is None and weight is not None and bit is not None:
-        torque = 0.0
-        if scene.drills:
-            drive = replace(scene.top_drive, weight_on_bit=weight, hook_load=None, block_speed=None)
-            torque = replace(scene, top_drive=drive).nominal().torque_on_bit
-        elif bit.kind == "empirical":
-            law, spin = bit.empirical, scene.top_drive.speed or 0.0
-            cut = (law.a2 * weight - law.a1) / spin + law.a3 if spin else 0.0
-            torque = law.a4 * cut + law.a5
+    weight, torque = weight_on_bit, torque_on_bit
+    if weight is None and scene.bites:
+        weight = scene.nominal().weight_on_bit
+    if torque is None and weight is not None and scene.bites:
+        drive = replace(scene.top_drive, weight_on_bit=weight, hook_load=None, block_speed=None)
+        torque = replace(scene, top_drive=drive).nominal().torque_on_bit
     found = []
     for name, operation in OPERATIONS.items():
         if names and name not in names:
@@ -130,14 +120,7 @@ def deepest(profile: Profile, values: F8) -> tuple[float, float]:
     return float(values[i]), float(profile.measured_depth[i])
 
 
-def stretches(measured_depth: F8, inside: Mapping[int, bool] | NDArray[np.bool_]) -> list[tuple[float, float]]:
+def stretches(measured_depth: F8, inside: NDArray[np.bool_]) -> list[tuple[float, float]]:
     """From-to measured depths (m) of the stretches where ``inside`` (n,) holds."""
-    flags = np.concatenate([[False], np.asarray(inside, dtype=bool), [False]])
-    edges = np.flatnonzero(flags[1:] != flags[:-1])
-    last = len(measured_depth) - 1
-    return [(float(measured_depth[a]), float(measured_depth[min(b - 1, last)])) for a, b in edges.reshape(-1, 2)]
-
-
-def metres(pairs: list[tuple[float, float]]) -> float:
-    """Length (m) of stretches."""
-    return math.fsum(b - a for a, b in pairs)
+    edges = np.flatnonzero(np.diff(inside, prepend=False, append=False))
+    return [(float(measured_depth[a]), float(measured_depth[b - 1])) for a, b in edges.reshape(-1, 2)]

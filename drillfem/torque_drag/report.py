@@ -94,6 +94,9 @@ def print_table(study: Study, console: Console | None = None) -> None:
             p = profiles[k]
             force, depth = deepest(p, p.side_force)
             cells = [escape(first.operation.title) if p is first else "", *([method] if several else [])]
+            if np.isnan(p.hook_load):  # no equilibrium found
+                table.add_row(*cells, *5 * ["-"])
+                continue
             cells += [f"{p.hook_load / 1e3:.1f}", f"{p.surface_torque / 1e3:.2f}" if p.operation.spin else "-"]
             table.add_row(*cells, f"{force / 1e3:.2f}", f"{depth:.0f}", buckling_text(p, study.limits))
     console = console or Console(width=None if Console().is_terminal else 100)
@@ -103,7 +106,7 @@ def print_table(study: Study, console: Console | None = None) -> None:
 
 
 def dataset(study: Study) -> xr.Dataset:
-    """All profiles over (model, operation, measured_depth), model the method, on the depths of the first method, SI units."""
+    """All profiles over (model, operation, measured_depth), on the depths of the first method; SI units."""
     first = study.first
     depth = first[0].measured_depth
     names = [p.operation.name for p in first]
@@ -215,17 +218,17 @@ def draw(study: Study, path: Path) -> Path:
                     twist.plot(p.torque / 1e3, p.measured_depth, **look)
         for stick in study.broomsticks:
             hook.plot(stick.hook_load / 1e3, stick.depth, color=COLOURS[stick.name], lw=1.9)
-        _range(pull, [p.tension / 1e3 for ps in study.profiles.values() for p in ps])
+        _range(pull, [p.tension for ps in study.profiles.values() for p in ps])
         pull.axvline(0.0, color=style.GREY, lw=0.9)
         if not turning:
             twist.text(0.5, 0.5, "nothing turns", transform=twist.transAxes, ha="center", color=style.GREY)
         for axes in (twist, side):
             axes.set_xlim(left=0.0)
         if study.broomsticks:
-            _range(hook, [b.hook_load / 1e3 for b in study.broomsticks])
+            _range(hook, [b.hook_load for b in study.broomsticks])
             hook.axvline(0.0, color=style.GREY, lw=0.9)
         _values(study, pull, twist)
-        handles = [
+        handles: list[Any] = [
             Line2D([], [], color=COLOURS[p.operation.name], lw=2.6, label=p.operation.title) for p in study.first
         ]
         if len(methods) > 1:
@@ -244,7 +247,7 @@ def draw(study: Study, path: Path) -> Path:
 
 def _hole(axes: Axes, line: Line) -> None:
     """Inclination over depth, with dogleg severity as a shade, joints of the string and changes of the wall."""
-    s = np.linspace(0.0, line.length, 1500)
+    s: F8 = np.linspace(0.0, line.length, 1500, dtype=np.float64)
     frame = line.hole.frame(s)
     bend = np.degrees(frame.dogleg_severity) * 30
     axes.plot(np.degrees(frame.inclination), s, color=style.INK, lw=1.9)
@@ -265,8 +268,7 @@ def _hole(axes: Axes, line: Line) -> None:
         )
     axes.set_xlim(0.0, top)
     table = line.hole.table
-    steps = table.friction_at[1:-1] if len(table.friction_at) > 2 else []
-    for depth in np.unique(np.round(steps)):
+    for depth in np.unique(np.round(table.friction_at[1:-1])):
         if 0 < depth < line.length:
             axes.axhline(depth, color=style.GREY, lw=0.9, ls=(0, (5, 3)))
     for depth in line.joints[1:-1]:
@@ -274,7 +276,9 @@ def _hole(axes: Axes, line: Line) -> None:
 
 
 def _range(axes: Axes, values: Sequence[F8]) -> None:
-    low, high = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
+    """Room around loads in N on an axis in kN; those that were not found count for nothing."""
+    values = [v for v in values if not np.isnan(v).any()]
+    low, high = (1e-3 * x for x in (min(float(v.min()) for v in values), max(float(v.max()) for v in values)))
     room = 0.06 * max(high - low, 1e-9)
     axes.set_xlim(min(low, 0.0) - room, high + 2 * room)
 

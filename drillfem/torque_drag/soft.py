@@ -6,9 +6,10 @@ With the effective tension F, the torque M handed down, and the force N on the w
     dF/ds = -w cos(inclination) + mu N (share of the motion that goes down the hole)
     dM/ds = -mu N r (share that goes about it)
 
-from the bit upwards: F = -(weight on bit), M = torque on bit at its lower end (Johancsik, Friesen and Dawson, SPE 11380,
-1984, as a differential equation; Sheppard, Wick and Burgess, SPE 15463, 1987). Runge-Kutta steps of fourth order between
-the places where anything jumps. `stations` is Johancsik's own sum over the stations of a survey, of first order.
+from the bit upwards: F = -(weight on bit), M = torque on bit at its lower end (Johancsik, Friesen and Dawson, SPE
+11380, 1984, as a differential equation; Sheppard, Wick and Burgess, SPE 15463, 1987). Runge-Kutta steps of fourth order
+between the places where anything jumps. `stations` is Johancsik's own sum over the stations of a survey, of first
+order.
 """
 
 from __future__ import annotations
@@ -78,7 +79,8 @@ def _points(line: Line, operation: Operation, spacing: float, friction: str) -> 
     breaks = breaks[np.append(np.diff(breaks) > 1e-9, True)]
     breaks[-1] = line.length
     count = np.maximum(1, np.ceil(np.diff(breaks) / spacing)).astype(int)
-    nodes = np.concatenate([[0.0], *(np.linspace(a, b, k + 1)[1:] for a, b, k in zip(breaks, breaks[1:], count))])
+    pieces = zip(breaks[:-1], breaks[1:], count, strict=True)
+    nodes: F8 = np.concatenate([[0.0], *(np.linspace(a, b, k + 1)[1:] for a, b, k in pieces)])
     steps = np.diff(nodes)
     inset = _EDGE * np.repeat(np.diff(breaks), count)
     at = np.stack([nodes[:-1] + inset, nodes[:-1] + steps / 2, nodes[1:] - inset], axis=1)
@@ -138,10 +140,10 @@ def johancsik(
 def stations(line: Line, operation: Operation, *, friction: str = "dynamic", spacing: float | None = None) -> Profile:
     """The same by Johancsik's sum, over the survey's stations (or every ``spacing`` m) and the joints of the string."""
     hole: Borehole = line.hole
+    count = max(2, math.ceil(line.length / (spacing or 30.0)) + 1)
+    at: F8 = np.linspace(0.0, line.length, count, dtype=np.float64)
     if spacing is None and hole.stations is not None:
         at = hole.stations[:, 0]
-    else:
-        at = np.linspace(0.0, line.length, max(2, math.ceil(line.length / (spacing or 30.0)) + 1))
     s = np.unique(np.concatenate([at[(at >= 0) & (at <= line.length)], line.joints]))
     frame, here = hole.frame(s), line.at((s[1:] + s[:-1]) / 2)
     mean = (frame.inclination[1:] + frame.inclination[:-1]) / 2
@@ -172,7 +174,8 @@ def lock_up_depth(line: Line, operation: Operation, **how: object) -> float | No
 
     None: the string gets to its depth. Looked for every 20 m, then by bisection.
     """
-    depths = np.linspace(min(20.0, line.length), line.length, max(2, math.ceil(line.length / 20.0)))
+    count = max(2, math.ceil(line.length / 20.0))
+    depths: F8 = np.linspace(min(20.0, line.length), line.length, count, dtype=np.float64)
     short = np.flatnonzero(hook_loads(line, operation, depths, **how) <= 0)
     if not len(short):
         return None

@@ -47,7 +47,8 @@ def test_wheel_has_files_where_the_checkout_has_links(project: Path, tmp_path: P
         assert (CHECKOUT / "drillfem" / name).is_symlink()
         assert (CHECKOUT / "drillfem" / name).resolve() == CHECKOUT / target
     wheel = names(build("wheel", project, tmp_path / "wheel"))
-    shipped = {f"drillfem/{p.relative_to(project / 'drillfem')}" for p in (project / "drillfem").rglob("*.py")}
+    files = [p for kind in ("*.py", "*.c") for p in (project / "drillfem").rglob(kind)]
+    shipped = {f"drillfem/{p.relative_to(project / 'drillfem')}" for p in files}
     for name, target in LINKS.items():
         found = {
             f"drillfem/{name}/{p.name}"

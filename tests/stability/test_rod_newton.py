@@ -56,8 +56,9 @@ def test_the_product_brackets_the_bit_whatever_the_scene_asks_for() -> None:
         stepper = Stepper(rod, initial_state(rod), RockContact.from_scene(rod.scene))
         snes = stepper.ts.getSNES()
         assert snes.getType() == "python"
-        assert isinstance(snes.getPythonContext(), BitCoupledNewton)
-        assert isinstance(snes.getPythonContext().bit, RockContact)
+        newton = snes.getPythonContext().newton
+        assert isinstance(newton, BitCoupledNewton)
+        assert isinstance(newton.bit, RockContact)
         stepper.destroy()
     # a run through axial stick: hundreds of steps on the ramp, one iteration each
     result = drillfem.simulate(drillfem.load_scene("vertical-c1-cd5", keys), until=0.8)

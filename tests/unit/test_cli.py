@@ -326,13 +326,13 @@ def test_render_demo_and_warm_up_call_their_rooms(run: Run, patched: Callable[..
 
     patched(
         render={"render_all": render_all},
-        demo={"main": calls.append},
+        demo={"main": lambda out, job: calls.append(out)},
         solve={"warm_up": lambda: calls.append("warm")},
     )
     run("run", SCENE, "--out", tmp_path / "a", "--until", 1)
     code, out, _ = run("render", tmp_path / "a", "--time", "0.5", "--field", "spin", "--film", "--window", "0:1")
     assert (code, out) == (0, f"{tmp_path / 'a' / 'string.png'}\n")
-    assert calls == [(tmp_path / "a", {"time": 0.5, "field": "spin", "film": True, "windows": [(0.0, 1.0)]})]
+    assert calls == [(tmp_path / "a", {"time": [0.5], "field": "spin", "film": True, "windows": [(0.0, 1.0)]})]
     assert run("demo", "--out", tmp_path / "d")[0] == 0
     assert calls[-1] == tmp_path / "d"
     code, out, _ = run("warm-up")

@@ -214,3 +214,23 @@ def test_a_string_beyond_the_hole_is_told_so():
     assert "beyond the end of the spline" in hole.complaint(found, r, p)
     found = found._replace(high=hole.length)
     assert hole.complaint(found, r, p) == ""
+
+
+# -- rows that are kept ---------------------------------------------------------------------------------------------
+
+
+def test_rows_are_kept_next_to_their_point_and_renewed_beyond():
+    hole = HOLES["helix"].with_diameters(0.3, [(100, 0.32), (200, None)])
+    u, nodes, basis, p = string(hole)
+    radius, out = np.full(7, 0.05), np.zeros((21, WALL))
+    project(u.ravel(), 5, nodes, basis, radius, hole.table, p, out)
+    for move, kept in ((3e-5, True), (0.02, False)):
+        before, start = out.copy(), p.copy()
+        u[:, :3] += move * hole.frame(150.0).tangent[0] + [0, 0.3 * move, 0]
+        found = project(u.ravel(), 5, nodes, basis, radius, hole.table, p, out)
+        assert np.array_equal(out, before) == np.array_equal(p, start) == kept
+        r = np.einsum("qn,cnk->cqk", basis, u[nodes][:, :, :3]).reshape(-1, 3)
+        frame = hole.frame(hole.nearest(r))
+        gap = frame.radius - 0.05 - np.linalg.norm(r - frame.position, axis=1)
+        assert found.gap == pytest.approx(gap.min(), abs=1e-12)
+        assert found.narrow == gap.argmin()

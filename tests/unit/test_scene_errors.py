@@ -9,7 +9,7 @@ import pytest
 from drillfem.errors import DrillfemError, SceneError
 from drillfem.scene import Scene, load_scene
 
-V, P, S, R, B = "vertical-c1-cd4", "pendulum", "spin-up", "roll-up", "bend-45"
+V, P, S, R, B, E = "vertical-c1-cd4", "pendulum", "spin-up", "roll-up", "bend-45", "vertical-pi"
 
 # scene, overrides, what the line must contain: the key, then the value or what is allowed
 BROKEN: list[tuple[str, dict[str, Any], list[str]]] = [
@@ -135,6 +135,21 @@ BROKEN: list[tuple[str, dict[str, Any], list[str]]] = [
     (S, {"string.0.material": {"density": 1, "youngs_modulus": 1, "poisson_ratio": 0}},
      ["string.0.material", "left out"]),
     (V, {"string.0.mass_per_length": 5}, ["string.0.mass_per_length = 5", "left out"]),
+    # drives, empirical bits, mud
+    (V, {"top_drive.kind": "soft-torque"}, ["missing key ends.top_inertia", "> 0 kg m^2"]),
+    (V, {"top_drive.rise_time": "2 s"}, ["top_drive.rise_time = '2 s'", "initial.state = 'nominal'"]),
+    (V, {"top_drive.weight_on_bit": None, "top_drive.block_speed": 0}, ["initial.state", "rest or laid", "0 m/s"]),
+    ("curved-c2", {"hole.inclination": "10 deg"}, ["top_drive.hook_load = '441.08 kN'", "here by 10 deg"]),
+    (V, {"model": "lumped", "top_drive.kind": "z-torque"}, ["model = 'lumped'", "turns at a given speed, not by a"]),
+    (V, {"model": "torsional", "mud.density": 1200}, ["model = 'torsional'", "it knows no mud"]),
+    (V, {"mud.viscosity": 0.1}, ["missing key mud.density", "> 0 in kg/m^3"]),
+    (P, {"mud.density": 1000, "mud.viscosity": 0.1}, ["mud.viscosity = 0.1", "left out where hole.kind = 'none'"]),
+    (S, {"mud.density": 1000}, ["missing key string.0.outer_diameter", "[mud]"]),
+    (E, {"model": "torsional"}, ["model = 'torsional'", "by another law"]),
+    (E, {"top_drive.weight_on_bit": "30 kN"}, ["weight_on_bit = '30 kN'", "exceed 34628.8 N, below which"]),
+    (E, {"initial.state": "laid"}, ["initial.spin = '70 rpm'", "left out where state = 'laid'"]),
+    (E, {"bit.empirical.force": "constant"}, ["bit.empirical.force = 'constant'", "one of reaction, nominal"]),
+    (E, {"top_drive.weight_on_bit": "1500 kN"}, ["weight_on_bit = '1500 kN'", "not exceed the string's weight"]),
     # numerics
     (V, {"mesh.degree": 5}, ["mesh.degree = 5", "from 1 to 4"]),
     (V, {"mesh.degree": 0}, ["mesh.degree = 0", "from 1 to 4"]),

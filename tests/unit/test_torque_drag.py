@@ -108,13 +108,13 @@ def test_hole_that_builds_lifts_a_pulled_string_off_its_low_side():
     on = line(p11(), 2691.0)
     found = soft_string(on, OPERATIONS["rotating"], spacing=1.0)
     s, frame = found.measured_depth, on.hole.frame(found.measured_depth)
-    inside = (s > 400) & (s < 600)  # no jump of curvature rate spoils the differences there
+    inside = (s > 400) & (s < 600)
     h = 1e-3
     before, after = on.hole.frame(s - h), on.hole.frame(s + h)
     builds, turns = ((getattr(after, x) - getattr(before, x)) / (2 * h) for x in ("inclination", "azimuth"))
     up = found.tension * builds - W * np.sin(frame.inclination)
     out = found.tension * turns * np.sin(frame.inclination)
-    assert found.side_force[inside] == pytest.approx(np.hypot(up, out)[inside], rel=1e-5)
+    assert found.side_force[inside] == pytest.approx(np.hypot(up, out)[inside], rel=1e-3)
 
 
 def test_drilling_puts_its_weight_and_torque_on_the_bit():
@@ -133,13 +133,21 @@ def test_drilling_puts_its_weight_and_torque_on_the_bit():
 # -- orders ---------------------------------------------------------------------------------------------------
 def test_orders_of_convergence():
     """Fourth order where nothing jumps; Johancsik's sum is of first order."""
-    smooth = Borehole.of("winding", [Segment(900.0, winding)], DIAMETER)
-    on = line(smooth, 900.0)
-    operation = replace(OPERATIONS["tripping-out"], weight_on_bit=-2e5)  # pulled: never changes sides
-    exact = soft_string(on, operation, spacing=0.5).hook_load
-    wide = [abs(soft_string(on, operation, spacing=x).hook_load - exact) for x in (36.0, 18.0)]
-    assert math.log2(wide[0] / wide[1]) == pytest.approx(4.0, abs=0.5)
-    summed = [abs(stations(on, operation, spacing=x).hook_load - exact) for x in (30.0, 15.0, 7.5)]
+
+    def bend(p):
+        t = np.stack([np.sin(p / 400), 0 * p, np.cos(p / 400)], axis=1)
+        return t, np.stack([np.cos(p / 400), 0 * p, -np.sin(p / 400)], axis=1) / 400
+
+    # friction out of this world: otherwise steps of 2 m have no error to measure
+    rough = line(Borehole.of("arc", [Segment(2.0 * k, bend) for k in range(1, 21)], DIAMETER), 40.0, 0.0, mu=200.0)
+    pull = replace(OPERATIONS["tripping-out"], weight_on_bit=-1.0)
+    wide = [abs(soft_string(rough, pull, spacing=h).hook_load / math.exp(20.0) - 1) for h in (0.5, 0.25, 0.125)]
+    assert np.log2(wide[:-1] / np.array(wide[1:])) == pytest.approx([4.0, 4.0], abs=0.3)
+    on = line(Borehole.of("winding", [Segment(900.0, winding)], DIAMETER), 900.0)
+    pull = replace(pull, weight_on_bit=-2e5)  # the string never changes sides
+    exact = soft_string(on, pull, spacing=0.5).hook_load
+    assert soft_string(on, pull).hook_load == pytest.approx(exact, rel=1e-9)
+    summed = [abs(stations(on, pull, spacing=x).hook_load - exact) for x in (30.0, 15.0, 7.5)]
     assert math.log2(summed[0] / summed[2]) / 2 == pytest.approx(1.0, abs=0.1)
 
 
@@ -250,7 +258,9 @@ def test_lock_up():
     steep = line(straight(500.0, 1.4, diameter=DIAMETER), 500.0)  # tan(1.4) > 1/mu: it does not slide by itself
     assert lock_up_depth(steep, OPERATIONS["tripping-in"]) == pytest.approx(20.0, abs=21.0)
     assert greatest_weight(steep, OPERATIONS["sliding"]) == 0.0
-    assert greatest_weight(on.to_depth(500.0), OPERATIONS["sliding"], buckled=False) == pytest.approx(500.0 * W, rel=1e-5)
+    assert greatest_weight(on.to_depth(500.0), OPERATIONS["sliding"], buckled=False) == pytest.approx(
+        500.0 * W, rel=1e-5
+    )
 
 
 def test_string_at_another_depth_loses_its_top():

@@ -1,0 +1,1 @@
+"""Buckling of a string in its hole, found from the rod itself."""
