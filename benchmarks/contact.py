@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -103,7 +105,7 @@ def laid(method: str, stiffness: float, elements: int) -> Laid | str:
     expected, fair = side_load(case, s)
     w = case.string[0].mass_per_length * case.gravity.magnitude
     error = float(np.abs(force - expected)[fair].max() / w)
-    return Laid(f"{method}, k_s = {stiffness:.0e}", s, force, error, -wall.gap, cpu)
+    return Laid(f"{method}, {stiffness:.0e}", s, force, error, -wall.gap, cpu)
 
 
 def at_rest() -> tuple[str, list[Laid]]:
@@ -129,11 +131,36 @@ def at_rest() -> tuple[str, list[Laid]]:
     return table(header, rows), kept
 
 
+@contextmanager
+def points(per_element: int) -> Iterator[None]:
+    """Contact integrated with this many points per cubic element."""
+    chosen = Rod.wall_degree
+    Rod.wall_degree = property(lambda _: 2 * per_element - 1)  # type: ignore[assignment, method-assign]
+    try:
+        yield
+    finally:
+        Rod.wall_degree = chosen  # type: ignore[method-assign]
+
+
+def rules() -> str:
+    """The error with the points of the mass matrix, and with the fewest."""
+    rows = []
+    for method, stiffness in (("penalty", 1e5), ("penalty", 1e6), ("penalty", 1e7), ("augmented", 1e6)):
+        row = [f"`{method}`", f"{stiffness:.0e}"]
+        for elements in (100, 200, 400):
+            for per_element in (4, 2):
+                with points(per_element):
+                    found = laid(method, stiffness, elements)
+                row.append(found if isinstance(found, str) else f"{100 * found.error:.2f} %")
+        rows.append(row)
+    header = [f"{n} elements, {count} points" for n in (100, 200, 400) for count in (4, 2)]
+    return table(["method", "k_s (N/m²)", *header], rows)
+
+
 def draw_rest(found: list[Laid]) -> None:
     case = scene(2500.0, 200, BEND)
     w = case.string[0].mass_per_length * case.gravity.magnitude
-    shown = {"penalty, k_s = 1e+04": style.ORANGE, "penalty, k_s = 1e+06": style.BLUE}
-    shown["augmented, k_s = 1e+06"] = style.VERMILION
+    shown = {"penalty, 1e+06": style.SKY, "penalty, 1e+04": style.BLUE, "augmented, 1e+06": style.VERMILION}
     with style.page(1300, 560) as figure:
         style.heading(
             figure, "What the wall carries", "build and hold, 2500 m in 200 elements, at rest without friction"
@@ -167,14 +194,25 @@ def falling(step: float, method: str = "penalty", retardation: float = 0.0, **ke
     )
 
 
-def gained(case: Scene) -> float:
-    """Most that the energy rose above that at the start, in falls across the clearance; inf where the run broke off."""
+def gained(case: Scene, rate: bool = True, within: bool = True) -> float:
+    """Most that the energy rose above that at the start, in falls across the clearance; inf where the run broke off.
+
+    rate: whether the approach counts; within: whether multipliers are moved within the step, or after it.
+    """
     rod = Rod(case)
+    assert rod.wall is not None and rod.loads.wall is not None
+    if not rate:
+        rod.wall.retardation = rod.loads.wall.retardation.value = 0.0  # type: ignore[union-attr]
+    move = rod.augment
+    if not within:
+        rod.augment = lambda _: False  # type: ignore[method-assign]
     run, worst, t = DirectRun(rod), 0.0, 0.0
     weight = case.mass * case.gravity.magnitude
     try:
         while t < case.time.end - 1e-9:
             t = run.step(case.time.end)
+            if not within:
+                move(0.0)
             u = run.stepper.u
             rod.set_state(u, np.zeros_like(u))
             fallen = float(u.reshape(-1, rod.ansatz.size)[:, 0].mean())
@@ -214,7 +252,13 @@ def bouncing() -> str:
         for name, gain in found.items():
             last = name in list(found)[4:]
             axes.loglog(
-                steps, np.maximum(gain, floor), "o-", color=kinds[name][0], label=name, ms=4, ls="--" if last else "-"
+                steps,
+                np.maximum(gain, floor),
+                color=kinds[name][0],
+                label=name,
+                marker="o",
+                ms=10 if "retardation" in name else 4,
+                ls="--" if last else "-",
             )
         axes.set(xlabel="steps in the period of the wall's spring", ylabel="energy gained, in falls")
         axes.set_ylim(floor / 1.5, 1e4)
@@ -233,6 +277,22 @@ def bouncing() -> str:
         ["", "100 %", "10 %", "3 %", "1 %"],
         [[name, *(least(gain, most) for most in (1.0, 0.1, 0.03, 0.01))] for name, gain in found.items()],
     )
+
+
+def multipliers() -> str:
+    """Energy gained by ways to move the multipliers, at eight steps per period."""
+    rows = []
+    for name, rate, within in (
+        ("after every step", False, False),
+        ("within the step", False, True),
+        ("within the step, with the rate of a step", True, True),
+    ):
+        row = [name]
+        for keys in ({"integrator": "theta"}, ALPHA | {"rho_infinity": 0.9}, ALPHA | {"rho_infinity": 0.5}):
+            gain = gained(falling(PERIOD / 8, "augmented", **keys), rate, within)
+            row.append("breaks off" if math.isinf(gain) else f"{gain:.1e}" if gain > 1e-3 else "0")
+        rows.append(row)
+    return table(["multipliers are moved", "trapezoidal", "generalised-α, ρ = 0.9", "ρ = 0.5"], rows)
 
 
 # -- in time ----------------------------------------------------------------------------------------------------------
@@ -296,7 +356,7 @@ def in_time() -> str:
                 name,
                 number(1e3 * r.penetration),
                 f"{r.row['work_friction']:.1f}",
-                f"{100 * r.summary['energy_balance_error']:.2f} %",
+                f"{100 * r.summary['energy_balance_error']:.2g} %",
                 f"{r.summary['newton_iterations'] / steps:.1f}",
                 f"{r.summary['factorisations'] / steps:.2f}",
                 f"{r.per_step:.2f}",
@@ -307,8 +367,8 @@ def in_time() -> str:
 
 
 def closest_points() -> tuple[str, str]:
-    """Table of the closest point as an unknown against local projection; fitted order of its error."""
-    rows, errors = [], []
+    """Table of the closest point as an unknown against local projection; fitted order of the string's place."""
+    rows, places = [], []
     sizes = (8, 16, 32, 64)
     for elements in sizes:
         one, other = (ran(start_up(elements, 0.2, closest_point=kind)) for kind in ("newton", "field"))
@@ -316,14 +376,14 @@ def closest_points() -> tuple[str, str]:
         assert wall is not None
         other.rod.set_state(other.u, np.zeros_like(other.u))
         error = float(np.abs(wall.p - wall.hole.nearest(wall.position(other.u))).max())
-        errors.append(error)
         r = [x.u.reshape(-1, x.rod.ansatz.size)[:, :3] for x in (one, other)]
+        places.append(float(np.abs(r[0] - r[1]).max()))
         force = [x.row["side_force"] for x in (one, other)]
         rows.append(
             [
                 f"{elements}",
                 number(1e6 * error),
-                number(1e6 * float(np.abs(r[0] - r[1]).max())),
+                number(1e6 * places[-1]),
                 number(abs(force[1] / force[0] - 1)),
                 *(f"{x.summary['newton_iterations']}" for x in (one, other)),
                 *(f"{x.per_step:.2f}" for x in (one, other)),
@@ -331,7 +391,7 @@ def closest_points() -> tuple[str, str]:
         )
     header = ["elements", "p between the nodes (µm)", "place of the string (µm)", "side force"]
     header += ["iterations", "as field", "ms per step", "as field"]
-    return table(header, rows), f"{np.polyfit(np.log(1 / np.array(sizes)), np.log(errors), 1)[0]:.1f}"
+    return table(header, rows), f"{np.polyfit(np.log(1 / np.array(sizes)), np.log(places), 1)[0]:.1f}"
 
 
 # -- friction ---------------------------------------------------------------------------------------------------------
@@ -492,7 +552,9 @@ def main() -> None:
     torque, soft, climbing = break_off()
     values = {
         "rest": rest,
+        "rules": rules(),
         "bounce": bouncing(),
+        "multipliers": multipliers(),
         "time": in_time(),
         "points": points,
         "order": order,
@@ -554,12 +616,17 @@ and 80 m from where the string changes sides.
 
 ![side force along well A](img/contact-rest.png)
 
-A penalty must be stiff enough for the clearance (k_s g = w) and soft enough for the mesh: the boundary layer
-(4EI/k_s)^¼ is 4.8, 2.7, 1.5 and 0.9 m for 1e4 to 1e7 N/m², the elements are 25 and 12.5 m. An augmented Lagrangian
-does not care for k_s: it is how fast the multipliers get there, no longer how deep the string lies. Its integration
-rule has one point less than the fields have intervals per element: with as many points as nodes multipliers
-outnumber what they hold, and the pressures zigzag (70 % in a string at rest on 10 m elements, 1.5 % with the rule
-chosen).
+A penalty must be stiff enough for the clearance: the string lies w/k_s deep. An augmented Lagrangian does not care
+for k_s, which is how fast the multipliers get there and no longer how deep the string lies.
+
+The boundary layer (4EI/k_s)^¼ next to a kink is 4.8, 2.7, 1.5 and 0.9 m for 1e4 to 1e7 N/m²; the elements are 25
+and 12.5 m long. Where the wall is stiffer than what the mesh can follow, it matters at how many points it holds the
+string. Penalties have the four points of the mass matrix per cubic element, which resolve a wall that the mesh
+resolves; multipliers have two, the fewest that spread an even load as the fields do. With four they would hold more
+points than there are unknowns to follow, and zigzag, as a penalty does that is too stiff for the mesh. The same
+error with either:
+
+{rules}
 
 ## In time: how long a step may be
 
@@ -573,17 +640,21 @@ Steps per period from which on no more is gained than
 
 {bounce}
 
-Below five steps per period every method without retardation feeds on the wall: energy grows a hundredfold within
-seconds. With a retardation of one step no step length does: the impact is inelastic for what is faster than the
-step. Damping by the integrator alone (ρ = 0.5) needs ten steps.
+Below three steps per period every method without retardation feeds on the wall: energy grows a hundredfold within
+seconds. Twenty keep it to a tenth, forty to three hundredths; damping by the integrator (ρ = 0.5) helps little, for
+it is the moment of touching that a step misses. With a retardation of one step nothing is gained at any step length:
+the impact is inelastic for what is faster than the step.
 
-An augmented Lagrangian that holds a point by its place alone throws it back with more than it brought (trapezoidal
-rule and generalised-α remember the force of the last step), moved once per step it is unstable too: its multipliers
-are an integral, s³ + ω²s + ω²/h = 0 has a growing pair of roots for any step h. Both were tried: energies grew 1e3-
-to 1e5-fold within 3 s. With the rate counted for a step the point comes to rest on the wall, and both are stable.
-Here the multipliers are moved within the step, until no point that pushes is further from the wall than the
-tolerance; the steps of the multipliers, k_s + ρA σ²/(1 + τσ) with σ = d(u̇)/du of the integrator, allow for the
-inertia that resists the correction, so that two or three of them do.
+An augmented Lagrangian that holds a point by its place alone throws it back with more than it brought, for the
+trapezoidal rule and generalised-α remember the force of the last step. Moved after every step it is unstable too: the
+multipliers are an integral, and s³ + ω²s + ω²/h = 0 has a growing pair of roots for every step h. With the rate counted
+for a step the point comes to rest on the wall. Energy gained in the same falls, eight steps per period:
+
+{multipliers}
+
+So they are moved within the step, until no point that pushes is further from the wall than the tolerance (where the
+integrator evaluates the forces; at the end of a step it can be a few times that). The steps of the multipliers, k_s +
+ρA σ²/(1 + τσ) with σ = d(u̇)/du of the integrator, allow for the inertia that resists the correction.
 
 A short string in a bend (140 m, 12 elements, spun up to 8 rad/s within 0.2 s, steps of 5 ms, 1 s):
 
@@ -605,8 +676,9 @@ so residual and tangent are exact; between the nodes p is interpolated, and off 
 
 {points}
 
-The error of p falls with order {order}. Iterations are the same; a block of a node has 14 unknowns instead of 13,
-and the hole is evaluated at every residual. Equilibria keep the local search, which gives the start.
+p is worst where the curvature jumps, for its interpolation knows no kinks; the place of the string comes nearer with
+order {order}. Iterations are the same; the block of a node has 14 unknowns instead of 13, and the hole is evaluated
+at every residual. Equilibria keep the local search, which gives the start.
 
 ## Friction
 
@@ -630,10 +702,10 @@ The whole rope touches √(2c/R) = 0.01 rad less than the arc, for its ends are 
 ## Which one
 
 `penalty`, the default, is the cheapest and what the thesis uses. k_s = 1e6 N/m² lets a string of 300 N/m sink by
-0.3 mm and wants steps of 2 ms to bounce elastically; longer steps want a `retardation_time` of one step if anything
-bounces. `augmented` where penetration matters (narrow clearances, tool joints, k_s unknown): with k_s of about ten
-times ρA/step² it costs little more. `smooth` where Newton's method has trouble with the kink: at rest in long
-strings.
+0.3 mm and wants steps of 1.5 ms to bounce elastically; with longer steps give it a `retardation_time` of one step if
+anything bounces: it costs nothing. `augmented` where penetration matters (narrow clearances, tool joints) or k_s is
+not known: with k_s of about ten times ρA/step² its cost is that of a penalty with some more factorisations. `smooth`
+has no kink for Newton's method: the fewest factorisations, and a wall that begins `smoothing` before itself.
 """
 
 

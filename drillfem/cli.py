@@ -197,7 +197,9 @@ def demo(
 def chart(
     cases: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[CASE]...", help="waves, lumped, torsional, axial-torsional; all by default."),
+        typer.Argument(
+            metavar="[CASE]...", help="waves, lumped, torsional, axial-torsional, off-bottom; all by default."
+        ),
     ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for pictures and numbers.")] = Path("charts"),
     quick: Annotated[bool, typer.Option("--quick", help="Seconds rather than minutes: fewer points.")] = False,
@@ -297,7 +299,7 @@ def torque_drag(
         typer.Option(metavar="NAME", help="rotating, tripping-out, tripping-in, drilling, sliding; may be repeated."),
     ] = None,
     method: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="soft, stations, stiff (a rod); may be repeated to compare.")
+        list[str] | None, typer.Option(metavar="NAME", help="soft, stations, stiff (a rod); may be repeated.")
     ] = None,
     set_: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key.")] = None,
     weight_on_bit: Annotated[str | None, typer.Option(metavar="LOAD", help="On bottom: '50 kN'.")] = None,

@@ -59,7 +59,7 @@ def drill(folder: Path, seconds: float) -> Result:
 
 def turn(folder: Path, seconds: float) -> Result:
     """Turn a string in the real well for ``seconds`` from rest into ``folder``; torque and drag beside it; draw."""
-    scene = load_scene(WELL, {"time.engine": "compiled", "output.fields_interval": "0.1 s"})
+    scene = load_scene(WELL, {"output.fields_interval": "0.1 s"})
     print(f"{scene.title}: a {scene.length:g} m string starts to turn in a real well, {seconds:g} s.")
     with ProgressDisplay() as progress:
         result = simulate(scene, out=folder, progress=progress, until=seconds)
@@ -68,10 +68,10 @@ def turn(folder: Path, seconds: float) -> Result:
     print("Static torque and drag of the same string (soft string):")
     steady = torque_and_drag(scene, folder / "torque-drag").first[0]
     history = result.history
-    late = np.asarray(history["time"]) > 0.8 * seconds
+    late = np.asarray(history["time"]) > 2 / 3 * seconds
     torque = float(np.asarray(history["top_torque"])[late].mean())
     print(
-        f"Torque of the drive, mean of the last {0.2 * seconds:g} s: {torque / 1e3:.2f} kN m; "
+        f"Torque of the drive, mean of the last {seconds / 3:.3g} s: {torque / 1e3:.2f} kN m; "
         f"steady rotation by torque and drag: {steady.surface_torque / 1e3:.2f} kN m."
     )
     print(f"The result is in {folder}:")

@@ -23,7 +23,8 @@ def hole_of(scene: Scene) -> Borehole | None:
     if hole.kind == "none" or hole.diameter is None:
         return None
     duration = scene.time.end - scene.time.start
-    advance = duration * max(abs(scene.top_drive.block_speed or 0.0), scene.nominal(weight=scene.weight).rate_of_penetration)
+    fastest = scene.nominal(weight=scene.weight).rate_of_penetration
+    advance = duration * max(abs(scene.top_drive.block_speed or 0.0), fastest)
     reach, wide = 1.1 * (scene.length + 2 * advance) + 100.0, hole.diameter
     radius = hole.radius or 0.0
     if hole.kind == "straight":

@@ -26,7 +26,7 @@ from .theory import Pipe
 #: Stiffness (N/m) with which the rock holds a bit on the axis of a hole that bends, where the scene has no bit.
 _GUIDE = Bit("free").guide_stiffness
 #: A step of creeping: greatest way aside, and what is rest (clearances); first drag and least (of F^2/4EI).
-_REACH, _REST, _DRAG = 0.1, 1e-6, (4.0, 1e-6)
+_REACH, _REST, _DRAG = 0.15, 1e-6, (4.0, 1e-4)
 #: Most steps, and most times an equilibrium that is not stable is left.
 _STEPS, _ESCAPES = 2000, 30
 #: Least product of quaternions next to each other: less, and a turn has slipped between two nodes.
@@ -222,8 +222,9 @@ class Column(Statics):
             if moved < _REST and drag <= least:
                 self.drag.value = 0.0
                 return x
-            if found.newton_iterations <= 6 and moved < _REACH / 2:
-                drag = max(drag / 3, least if moved <= max(last, _REST) or not growth else 2 * growth)
+            if found.newton_iterations <= 6:
+                grows = growth > 0 and moved > 1.1 * max(last, _REST)
+                drag = max(drag * max(moved / (0.7 * _REACH), 0.1), 2 * growth if grows else least)
             last = moved
         self.drag.value = 0.0
         raise SimulationError(

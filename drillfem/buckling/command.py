@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,16 +19,17 @@ from ..render import style
 from ..results.atomic import write_json
 from ..results.manifest import check_new_folder
 from ..solve.laid import lay
+from ..solve.wall_guards import unseen_buckling
 from ..torque_drag.command import load_of
 from ..torque_drag.limits import Limits, limits
 from .column import Column
 from .drawing import MAP
 from .follow import Step, follow, record
-from .theory import onset_error
 
 if TYPE_CHECKING:
     from ..scene import Scene
 
+log = logging.getLogger("drillfem")
 STEPS = 10
 
 
@@ -44,7 +46,7 @@ def turned(step: Step, laid: Step) -> float:
 def run(
     scene: Scene, out: Path, weight_on_bit: str, steps: int = STEPS, console: Console | None = None
 ) -> tuple[list[Step], Limits]:
-    """Push with 0 to ``weight_on_bit`` in equal steps; print a table, write ``buckling.png`` and ``.json`` into ``out``.
+    """Push with up to ``weight_on_bit`` in equal steps; print a table, write ``buckling.png`` and ``.json`` to ``out``.
 
     Raises SceneError; SimulationError where not even the first step finds an equilibrium.
     """
@@ -58,36 +60,31 @@ def run(
     rod = Rod(replace(scene, model="spatial"))
     column = Column(rod)
     laid = column.at(column.start(lay(rod)))
-    found, notes = [record(column, laid)], list(coarse(scene, line))
+    found, notes = [record(column, laid)], coarse(scene, line, weight)
+    for note in notes:
+        log.warning(note)
     try:
         found.extend(follow(column, laid, np.linspace(0.0, weight, steps + 1)[1:]))
     except SimulationError as error:
         if len(found) == 1:
             raise
+        log.warning(str(error))
         notes.append(str(error))
     limit = limits(line, found[0].arc_length)
     out.mkdir(parents=True, exist_ok=True)
     rows = [_row(line, limit, step, found[0]) for step in found[1:]]
-    _print(rows, notes, console)
+    _print(rows, console)
     draw(scene.title, line, limit, found, out / "buckling.png")
     write_json(out / "buckling.json", {"scene": scene.to_dict(), "notes": notes, "steps": rows})
     print(out / "buckling.png")
     return found, limit
 
 
-def coarse(scene: Scene, line: Line) -> list[str]:
-    """What the mesh takes from the waves of a buckling string, where that is more than 2 %."""
-    s = np.linspace(0.0, line.length, 400)
-    limit, here = limits(line, s).sinusoidal, line.at(s)
-    wave = 2 * np.pi * np.sqrt(2 * here.bending / limit)
-    i, spacing = int(wave.argmin()), scene.length / scene.mesh.elements
-    error = onset_error(spacing, float(wave[i]), scene.mesh.degree)
-    if error < 0.02:
-        return []
-    return [
-        f"mesh.elements = {scene.mesh.elements}: elements of {spacing:.3g} m make the waves of {wave[i]:.3g} m, in which "
-        f"the string snakes at {s[i]:.0f} m, {100 * error:.0f} % too stiff"
-    ]
+def coarse(scene: Scene, line: Line, weight: float) -> list[str]:
+    """What the guard of a run would say of the mesh of a string that carries a weight on bit (N)."""
+    tangent = line.hole.frame(line.length).tangent[0]
+    ends = replace(scene.ends, tip_force=tuple(float(x) for x in -weight * tangent))
+    return list(unseen_buckling(replace(scene, bit=None, ends=ends)))
 
 
 def _row(line: Line, limit: Limits, step: Step, laid: Step) -> dict[str, float]:
@@ -105,7 +102,7 @@ def _row(line: Line, limit: Limits, step: Step, laid: Step) -> dict[str, float]:
     }
 
 
-def _print(rows: list[dict[str, float]], notes: list[str], console: Console | None) -> None:
+def _print(rows: list[dict[str, float]], console: Console | None) -> None:
     table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
     heads = ("weight on bit\nkN", "compression over\nsnaking limit", "at\nm", "winds by\nturns")
     for head in (*heads, "bending moment\nup to kN m", "at\nm", "side force\nup to kN/m"):
@@ -122,8 +119,6 @@ def _print(rows: list[dict[str, float]], notes: list[str], console: Console | No
         )
     console = console or Console(width=None if Console().is_terminal else 100)
     console.print(table)
-    for note in notes:
-        console.print(note, markup=False, highlight=False, soft_wrap=True)
 
 
 def draw(title: str, line: Line, limit: Limits, found: list[Step], path: Path) -> Path:
@@ -145,10 +140,12 @@ def draw(title: str, line: Line, limit: Limits, found: list[Step], path: Path) -
             (limit.sinusoidal, style.VERMILION, "snakes"),
             (limit.helical, style.PURPLE, "winds"),
         ):
-            push.plot(load / 1e3, limit.measured_depth, color=colour, lw=1.6, ls=(0, (4, 2)), label=f"{name}, by formula")
+            push.plot(
+                load / 1e3, limit.measured_depth, color=colour, lw=1.6, ls=(0, (4, 2)), label=f"{name}, by formula"
+            )
         high = max(float(compression(line, found[-1]).max()), float(limit.sinusoidal.min()))
         push.set_xlim(-0.5 * high / 1e3, 1.6 * high / 1e3)
-        push.legend(loc="upper left")
+        figure.legend(*push.get_legend_handles_labels(), loc="upper left", bbox_to_anchor=(0.052, 0.925), ncols=2)
         for axes, name, label in (
             (push, "Compression", "kN"),
             (angle, "Angle about the hole's axis", "turns, from the low side"),

@@ -26,7 +26,12 @@ MAP = "viridis"
 
 
 def tube(
-    axes: Axes, step: Step, radius: float, height: float = 1.0, span: tuple[float, float] | None = None, top: float = 0.0
+    axes: Axes,
+    step: Step,
+    radius: float,
+    height: float = 1.0,
+    span: tuple[float, float] | None = None,
+    top: float = 0.0,
 ) -> LineCollection:
     """Draw a string in its hole, seen from the side and a little along it; up is up, width drawn ``height`` high.
 

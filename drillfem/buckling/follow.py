@@ -14,7 +14,7 @@ from .column import Column
 
 @dataclass(frozen=True)
 class Step:
-    """A stable equilibrium under a load (N). Arrays over the nodes from the top down, ``side`` over the wall's points."""
+    """A stable equilibrium under a load (N). Arrays are over the nodes from the top down, ``side`` over contact points."""
 
     load: float
     x: Array  # the state, flat
@@ -33,7 +33,9 @@ class Step:
     @property
     def angle(self) -> Array:
         """Angle about the hole's axis (nodes,), rad, from its low side, without jumps; ends on the axis have none."""
-        off = self.radius > 1e-3 * self.radius.max()
+        off = self.radius > max(1e-3 * self.radius.max(), 1e-9)
+        if not off.any():
+            return np.zeros_like(self.arc_length)
         turned = np.unwrap(np.arctan2(self.position[off, 1], self.position[off, 0]))
         return np.interp(self.arc_length, self.arc_length[off], turned)
 

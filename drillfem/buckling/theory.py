@@ -17,7 +17,6 @@ string (2.83 sqrt(EI w/r); Chen, Lin and Cheatham 1990). `snake` and `helix` fin
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -127,7 +126,9 @@ def _least(beta: float, orders: F8, turn: float, start: F8) -> tuple[F8, F8, flo
 
 def snake(betas: F8) -> list[Wave]:
     """Snaking strings at ascending loads beta > 1, each found from the last one."""
-    orders, at, out = np.array([1.0, 3.0, 5.0, 7.0]), np.array([1.0, 0.3, 0.0, 0.0, 0.0]), []
+    # just beyond the onset the amplitude is that of -(beta - 1) A^2/2 + 11 A^4/64
+    start = math.sqrt(16 / 11 * (betas[0] - 1))
+    orders, at, out = np.array([1.0, 3.0, 5.0, 7.0]), np.array([1.0, start, 0.0, 0.0, 0.0]), []
     for beta in betas:
         at, angle, energy = _least(float(beta), orders, 0.0, at)
         out.append(Wave(float(beta), energy, float(at[0]), float(np.abs(angle).max())))
@@ -148,18 +149,5 @@ def equal_energy() -> float:
     """Load beta at which a snaking string and a helix have the same energy: 2 beta = 2.90 stands where 2.83 does
     against the straight string."""
     at = np.linspace(1.3, 1.6, 31)
-    gain: Callable[[F8], F8] = lambda b: np.interp(b, at, [w.energy for w in snake(at)]) - np.interp(
-        b, at, [w.energy for w in helix(at[::-1])][::-1]
-    )
-    return float(brentq(lambda b: float(gain(np.array(b))), at[0], at[-1]))
-
-
-#: Relative error of the load at which a rod on elements of degree 1, 2, 3 snakes, over (spacing/wave)^(2 degree)
-#: (measured: docs/buckling.md).
-MESH_ERROR = (1.6, 1.0, 0.23)
-
-
-def onset_error(spacing: float, wave: float, degree: int) -> float:
-    """How much too high a mesh finds the load of waves this long (m): elements of ``spacing`` (m), relative."""
-    order = min(degree, len(MESH_ERROR))
-    return MESH_ERROR[order - 1] * (spacing / wave) ** (2 * order)
+    gain = np.array([a.energy - b.energy for a, b in zip(snake(at), helix(at[::-1])[::-1], strict=True)])
+    return float(brentq(lambda beta: float(np.interp(beta, at, gain)), at[0], at[-1]))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from .points import Chart
 
-CASES = ("waves", "lumped", "torsional", "axial-torsional")
+CASES = ("waves", "lumped", "torsional", "axial-torsional", "off-bottom")
 
 
 def compute(case: str, quick: bool = False, progress: Callable[[str], None] = lambda _: None) -> Chart:
@@ -15,6 +15,10 @@ def compute(case: str, quick: bool = False, progress: Callable[[str], None] = la
         from . import waves
 
         return waves.chart(waves.QUICK if quick else waves.FULL, progress)
+    if case == "off-bottom":
+        from . import off_bottom
+
+        return off_bottom.chart(off_bottom.QUICK if quick else off_bottom.FULL, progress)
     from . import drilling
 
     return drilling.chart(case, (drilling.QUICK if quick else drilling.FULL)[case], progress)

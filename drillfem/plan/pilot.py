@@ -11,7 +11,7 @@ import numpy as np
 from drillfem.errors import DrillfemError
 from drillfem.results import Result, dominant_in
 from drillfem.scene import Scene
-from drillfem.scene.ladder import rank
+from drillfem.scene.ladder import BESIDE, rank
 
 #: A pilot lasts this long (s), and no more steps than that.
 SECONDS, STEPS = 20.0, 20_000
@@ -57,7 +57,8 @@ class Pilot:
     plus spread (`deviation`). ``numerics``: the same for the ``subject`` (the model of the plan, or the nearest below
     that was run) against itself with half the step, a double mesh, nearby starts. ``speed``: simulated over wall
     time. ``main_wave``: frequency of the bit's strongest torsional wave (Hz). ``peak_weight``: greatest weight on bit
-    (N) of the reference. ``failed``: why a rung could not be run.
+    (N) of the reference. ``failed``: why a rung could not be run. ``laid``: for models beside the ladder, the sum of
+    their side forces at the start over that of the highest rung, less 1.
     """
 
     seconds: float
@@ -70,6 +71,7 @@ class Pilot:
     main_wave: Mapping[str, float] = field(default_factory=dict)
     peak_weight: float | None = None
     failed: Mapping[str, str] = field(default_factory=dict)
+    laid: Mapping[str, float] = field(default_factory=dict)
 
 
 class _TooSlowError(Exception):
@@ -123,7 +125,7 @@ def on(scene: Scene, model: str) -> Scene:
 
 
 def run_pilot(scene: Scene, chosen: str, able: list[str]) -> Pilot:
-    """Run the rungs ``able`` of a scene for `SECONDS`; those that PETSc steps only for `PACE_STEPS` steps.
+    """Run the rungs ``able`` of a scene for `SECONDS`; those whose whole system is stepped only for `PACE_STEPS` steps.
 
     What cannot be run here, or does not fit `BUDGET`, is named in ``failed`` with the reason.
     """
@@ -156,7 +158,10 @@ def run_pilot(scene: Scene, chosen: str, able: list[str]) -> Pilot:
             look()
             return simulate(one, until=time.start + duration, progress=look, warn=False)  # the plan speaks for its runs
         except (DrillfemError, ImportError, _TooSlowError) as error:
-            failed[name] = " ".join(str(error).split())
+            if isinstance(error, _TooSlowError) and rates and rates[-1] > 0:
+                speed[name] = rates[-1]  # slow, but how slow is known
+            else:
+                failed[name] = " ".join(str(error).split())
             return None
         finally:
             left -= (clock.perf_counter() - began) * counts
@@ -180,14 +185,15 @@ def run_pilot(scene: Scene, chosen: str, able: list[str]) -> Pilot:
                 done[model] = result
         return done
 
-    whole = [m for m in able if on(scene, m).engine != "petsc"]
-    slow = [m for m in able if m not in whole]
+    ladder = [m for m in able if m not in BESIDE]
+    whole = [m for m in ladder if on(scene, m).engine not in ("petsc", "compiled")]
+    slow = [m for m in ladder if m not in whole]
     paced = min(seconds, PACE_STEPS * time.step)
     runs = march(whole, seconds)
-    if chosen in slow or not runs:
-        march(slow, paced)
+    begun = march(slow, paced) if chosen in slow or not runs else {}
+    laid = _laid(march([m for m in able if m in BESIDE], paced), begun)
     if not runs:
-        return Pilot(seconds, speed=speed, dofs=dofs, failed=failed)
+        return Pilot(seconds, speed=speed, dofs=dofs, failed=failed, laid=laid)
     reference = max(runs, key=rank)
     subject = chosen if chosen in runs else reference
     taken = {model: signals(result, names) for model, result in runs.items()}
@@ -217,7 +223,16 @@ def run_pilot(scene: Scene, chosen: str, able: list[str]) -> Pilot:
         main,
         float(np.max(best["bit_weight"].values)) if "bit_weight" in best else None,
         failed,
+        laid,
     )
+
+
+def _laid(beside: Mapping[str, Result], rungs: Mapping[str, Result]) -> dict[str, float]:
+    """Side force at the start of models beside the ladder over that of the highest rung that has one, less 1."""
+    pressed = {m: float(r.history["side_force"][0]) for m, r in rungs.items() if "side_force" in r.history}
+    if not pressed or not (reference := pressed[max(pressed, key=rank)]):
+        return {}
+    return {m: float(r.history["side_force"][0]) / reference - 1 for m, r in beside.items()}
 
 
 def _changed(base: Scene) -> dict[str, Scene]:

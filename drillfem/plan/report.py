@@ -68,7 +68,7 @@ def as_text(plan: Plan) -> str:
         "this run",
     )
     rows: list[tuple[str, ...]] = [head]
-    for rung in plan.rungs:
+    for rung in (*plan.rungs, *plan.beside):
         speed, wall = _speed(rung)
         worst = max(rung.measured, key=lambda name: rung.measured[name]) if rung.measured else ""
         mark = "chosen" if rung.model == plan.chosen else ""
@@ -87,7 +87,7 @@ def as_text(plan: Plan) -> str:
         )
     told = [i for i in range(len(head)) if i == 0 or any(row[i] not in ("", "-") for row in rows[1:])]
     lines += _table([tuple(row[i] for i in told) for row in rows])
-    lines += [f"  {rung.model}: {rung.obstacle}" for rung in plan.rungs if rung.obstacle]
+    lines += [f"  {rung.model}: {rung.obstacle}" for rung in (*plan.rungs, *plan.beside) if rung.obstacle]
     if pilot is not None:
         lines += [f"  {name}: {why}" for name, why in pilot.failed.items() if name not in MODELS]
     lines.append("")

@@ -9,7 +9,7 @@ from typing import Any
 from drillfem.meshes.points import distribute
 from drillfem.plan.pilot import Pilot, run_pilot
 from drillfem.scene import Scene
-from drillfem.scene.ladder import MODELS, Finding, findings, giver, lowest, obstacle, rank
+from drillfem.scene.ladder import BESIDE, MODELS, Finding, findings, giver, lowest, obstacle, rank
 from drillfem.scene.nominal import lumps, quantity
 from drillfem.scene.tables import GIVES
 
@@ -41,7 +41,8 @@ class Rung:
 @dataclass(frozen=True)
 class Plan:
     """What `plan_of` found. ``chosen``: the lowest rung that represents the scene; ``runs_with``: the one that its
-    ``model`` key leads to. ``error``: expected relative error by cause. ``lost``: what the rung ``lower`` lacks."""
+    ``model`` key leads to. ``error``: expected relative error by cause. ``lost``: what the rung ``lower`` lacks.
+    ``beside``: models beside the ladder that this scene could be run with."""
 
     scene: Scene
     chosen: str
@@ -54,10 +55,11 @@ class Plan:
     lower: str
     lost: tuple[str, ...]
     notes: tuple[str, ...]
+    beside: tuple[Rung, ...] = ()
 
     def rung(self, model: str) -> Rung:
         """The rung of that name."""
-        return self.rungs[rank(model)]
+        return next(r for r in (*self.beside, *self.rungs) if r.model == model)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -70,6 +72,7 @@ class Plan:
             "tolerance": self.scene.output.tolerance,
             "rules": [asdict(replace(f, numbers=dict(f.numbers))) for f in self.findings],
             "rungs": [asdict(r) | {"off": r.off} for r in self.rungs],
+            "beside": [asdict(r) | {"off": r.off} for r in self.beside],
             "pilot": None if self.pilot is None else {"seconds": self.pilot.seconds, "reference": self.pilot.reference},
             "expected_error": self.error,
             "lower": self.lower,
@@ -100,7 +103,9 @@ def plan_of(scene: Scene, pilot: bool = True) -> Plan:
     unbound = replace(scene, output=replace(scene.output, wanted=None))  # what a rung could run, whatever it gives
     able = [m for m in MODELS if not obstacle(unbound, m)]
     lower = next((m for m in reversed(able) if rank(m) < rank(chosen)), "")
-    measured = run_pilot(replace(scene, model=asked or chosen), chosen, _worth(able, chosen)) if pilot else None
+    others = [m for m in BESIDE if scene.hole.bends and not obstacle(unbound, m)]
+    worth = [*_worth(able, chosen), *others]
+    measured = run_pilot(replace(scene, model=asked or chosen), chosen, worth) if pilot else None
     rungs = tuple(_rung(scene, m, found, measured) for m in MODELS)
     error = _expected(rungs[rank(chosen)], measured)
     plan = Plan(
@@ -115,6 +120,7 @@ def plan_of(scene: Scene, pilot: bool = True) -> Plan:
         lower,
         (),
         (),
+        tuple(_rung(scene, m, (), measured) for m in others),
     )
     return replace(plan, lost=_lost(plan), notes=_notes(plan))
 
@@ -144,12 +150,18 @@ def _rung(scene: Scene, model: str, found: tuple[Finding, ...], pilot: Pilot | N
         model,
         why,
         by_rules,
-        dict(pilot.off.get(model, {})) if pilot else {},
+        _measured(model, pilot) if pilot else {},
         speed,
         (scene.time.end - scene.time.start) / speed if speed else None,
         pilot.dofs.get(model) if pilot else None,
         pilot.main_wave.get(model) if pilot else None,
     )
+
+
+def _measured(model: str, pilot: Pilot) -> dict[str, float]:
+    """What the pilot measured a model to be off by; of one beside the ladder, its side force at the start."""
+    laid = {"side_force": abs(pilot.laid[model])} if model in pilot.laid else {}
+    return laid | dict(pilot.off.get(model, {}))
 
 
 def _expected(rung: Rung, pilot: Pilot | None) -> dict[str, float]:
@@ -175,10 +187,11 @@ def _lost(plan: Plan) -> tuple[str, ...]:
     scene, chosen, lower = plan.scene, plan.chosen, plan.lower
     if not rank(chosen):
         return ("there is no lower rung",)
+    beside = [f"beside the ladder: {_LEFT_OUT[r.model]}" for r in plan.beside]
     if not lower:
         why = obstacle(replace(scene, output=replace(scene.output, wanted=None)), MODELS[rank(chosen) - 1])
         found = [f"{f.rule}: {f.text}" for f in plan.findings if rank(f.needs) >= rank(chosen)]
-        return (f"no lower rung can run it: {why}", *found)
+        return (f"no lower rung can run it: {why}", *found, *beside)
     lost = []
     outputs = [n for m in MODELS[rank(lower) + 1 : rank(chosen) + 1] for n in GIVES[m]]
     if outputs:
@@ -206,7 +219,14 @@ def _lost(plan: Plan) -> tuple[str, ...]:
         if waves[0] and waves[1]:
             text += f"; the bit swings at {waves[0]:.3g} Hz, not {waves[1]:.3g} Hz" if _differ(*waves) else ""
         lost.append(text)
-    return tuple(lost)
+    return (*lost, *beside)
+
+
+_LEFT_OUT = {
+    "soft-string": "soft-string twists in the curved hole, rubs on its wall with the force of weight and tension, and "
+    "leaves out bending stiffness, clearance, and all motion but the twist: buckling, whirl, lift-off, axial "
+    "waves, and friction that the motion along the hole takes away",
+}
 
 
 def _differ(a: float | None, b: float | None) -> bool:

@@ -65,10 +65,10 @@ ROWS: tuple[Row, ...] = (
 
 #: of a string in a well, besides those of its bit
 IN_WELL: tuple[Row, ...] = (
-    ("top_torque", "torque of\nthe drive", 1e-3, "kN m", style.ORANGE),
-    ("wall_torque", "friction\ntorque", 1e-3, "kN m", style.ORANGE),
+    ("top_torque", "drive torque", 1e-3, "kN m", style.ORANGE),
+    ("wall_torque", "friction torque", 1e-3, "kN m", style.ORANGE),
     ("hook_load", "hook load", 1e-3, "kN", style.ORANGE),
-    ("side_force", "side force\nof all", 1e-3, "kN", style.PURPLE),
+    ("side_force", "side force", 1e-3, "kN", style.PURPLE),
     ("penetration", "into the wall", 1e3, "mm", style.PURPLE),
 )
 
@@ -238,6 +238,8 @@ def spectra(story: Story, path: Path, chosen: Sequence[tuple[float, float]] | No
     rows = looked_at(story, chosen)
     fastest = 0.5 / float(np.median(np.diff(time)))
     top = min(TOP, fastest)
+    if story.in_well:
+        top = min(top, max(loudest(story, [row[0] for row in wanted], rows), 1.0))
     height = 150 + 410 * len(rows) + 60
     with style.page(1600, height) as figure:
         style.heading(figure, f"{story.title}: spectra of the bit's speeds", subtitle_of_history(story, time))
@@ -277,6 +279,17 @@ def spectra(story: Story, path: Path, chosen: Sequence[tuple[float, float]] | No
             said += " Above: natural frequencies."
         figure.text(0.985, 1 - 62 / height, said, ha="right", fontsize=10.5, color=style.GREY)
         return style.save(figure, path)
+
+
+def loudest(story: Story, names: list[str], rows: list[Window]) -> float:
+    """A round frequency (Hz) above all that is louder than a 200th of the strongest wave of its channel."""
+    highest = 0.0
+    for name in names:
+        for window in rows:
+            f, a = spectra_in(story.history, name, window[1:])[1]
+            f, a = f[f > 0], a[f > 0]
+            highest = max(highest, float(f[a > a.max() / 200].max()))
+    return float(next((top for top in (1, 2, 3, 4, 5, 6, 8, 10, 15, 20) if top > 1.05 * highest), TOP))
 
 
 def looked_at(story: Story, chosen: Sequence[tuple[float, float]] | None) -> list[Window]:

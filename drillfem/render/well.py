@@ -50,7 +50,7 @@ class Well:
         #: radius (n,) of what touches the wall at the nodes, m
         self.touching = np.interp(story.arc, *self._touching)
         deepest = float(story.at_wall("wall_depth").max())
-        #: measured depth (m) to which the hole is drawn: all of what was surveyed, else a little further than the string
+        #: measured depth (m) to which the hole is drawn: all that was surveyed, else a little further than the string
         self.end = self.hole.length
         if self.hole.kind not in ("survey", "spline"):
             self.end = min(self.end, deepest + 0.01 * story.length)

@@ -370,6 +370,7 @@ def _hole_column(axes: Axes, well: Well) -> None:
         axes.text(
             0.97, 0.988, f"shaded: bend,\nup to {style.number(float(bend.max()), 2)}\u00b0/30 m",
             transform=axes.transAxes, ha="right", va="top", fontsize=9.5, color="#20759b",
+            bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 1},
         )  # fmt: skip
     axes.locator_params(axis="x", nbins=4)
 

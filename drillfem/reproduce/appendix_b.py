@@ -11,7 +11,7 @@ from drillfem.scene import Scene
 
 from .chapter4 import FAST
 from .claims import Case, Claim, Experiment, Run, Runs, Value, Variation, of_scene, statement
-from .signals import PENETRATION, SIDE_FORCE, SPIN, TOP_SPIN
+from .signals import PENETRATION, SIDE_FORCE, SPIN, TOP_SPIN, Reading
 
 WHOLE, EARLY, LATE = (0.0, 100.0), (0.0, 40.0), (60.0, 100.0)
 RPM = np.pi / 30
@@ -52,9 +52,9 @@ def _start(runs: Runs) -> Value:
 
 def _straight(runs: Runs) -> tuple[bool | None, str]:
     """The rod's spins are those of the straight string."""
-    apart = []
+    apart, window = [], runs["CR"].reading.window or WHOLE
     for name in (SPIN, TOP_SPIN):
-        a, b = (runs[run].part(name, WHOLE) for run in ("CR", "straight"))
+        a, b = (runs[run].part(name, window) for run in ("CR", "straight"))
         if not len(a) or len(a) != len(b):
             return None, ""
         apart.append(float(np.abs(a - b).max() / np.abs(b).max()))
@@ -101,10 +101,10 @@ B4 = Case(
     "B-4",
     ("vertical-pi",),
     "Appendix B.1.4: a vertical string under a PI drive, on an empirical bit law",
-    "The thesis shows the spins of top and bit over 100 s and says that they match those of its reference, whose string "
-    "is straight. The numbers of the law are what (B-2) to (B-5) and table B.2 come to; the string is that of table "
-    "4.3. Not printed: k_s (1e6 N/m2 here), whether F in (B-5) is the weight wanted or that on the bit (the latter "
-    "here), and the regularised rate of penetration (that whose depth of cut gives the torque of (B-5)).",
+    "The thesis shows the spins of top and bit over 100 s and says that they match those of its reference, whose "
+    "string is straight. The numbers of the law are what (B-2) to (B-5) and table B.2 come to; the string is that of "
+    "table 4.3. Not printed: k_s (1e6 N/m2 here), whether F in (B-5) is the weight wanted or that on the bit (the "
+    "latter here), and the regularised rate of penetration (that whose depth of cut gives the torque of (B-5)).",
     {"CR": Run("vertical-pi", FAST), "straight": Run("vertical-pi", {**FAST, "model": "axial-torsional"})},
     (
         *(
@@ -119,7 +119,14 @@ B4 = Case(
             )
         ),
         of_scene(
-            "at", "spin at the greatest torque", "CR", 4.1, "(B-5)", lambda s: _peak(s)[1], unit="rad/s", resolution=0.05
+            "at",
+            "spin at the greatest torque",
+            "CR",
+            4.1,
+            "(B-5)",
+            lambda s: _peak(s)[1],
+            unit="rad/s",
+            resolution=0.05,
         ),
         Claim("start", "spin of the bit at the start", 70.0, "B.1.5", _start, ("CR",), "rpm"),
         statement("straight", "the rod is what the straight string is", ("CR", "straight"), "B.1.4.2", _straight),
@@ -130,12 +137,11 @@ B4 = Case(
     (
         Experiment(
             "A string that is disturbed",
-            ("straight", "within", "period"),
-            (
-                Variation("gravity tilted by 1e-3", _TILT, runs=("CR",)),
-                Variation("gravity tilted, k_s = 1e8 N/m2", {**_TILT, "contact.stiffness": 1e8}, runs=("CR",)),
-            ),
-            "",
+            ("straight", "within"),
+            (Variation("gravity tilted by 1e-3, 20 s", _TILT, None, Reading(window=(0.0, 20.0)), 20.0, ("CR",)),),
+            "Nothing pushes the string of the scene aside, so it never touches the wall, though it is pushed with six "
+            "times the load that buckles it. Disturbed, it lies on the wall and sinks some micrometres into it, and "
+            "turns as before.",
             explains=False,
         ),
         Experiment(
@@ -146,7 +152,8 @@ B4 = Case(
                 Variation("300 elements", {"mesh.elements": 300}, runs=("straight",)),
                 Variation("2.5 ms steps", {"time.step": 2.5e-3}, runs=("straight",)),
             ),
-            "",
+            "Nothing of it matters. Drive and string swing as one body on the integral gain, with a period of 21.5 "
+            "s, and waves of twist on top of it die out.",
             explains=False,
         ),
     ),

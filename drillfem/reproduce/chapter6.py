@@ -1,9 +1,10 @@
-"""Chapter 6 in a vertical hole: the rod (M3) as a lumped model (V1), and four dampings (C1)."""
+"""Chapter 6: the rod (M3) as a lumped model (V1), four dampings in a vertical hole (C1), drilling into a curve (C2)."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from .claims import (
     torsional_stick,
 )
 from .imitation import Numerics
-from .signals import ADVANCE, DEPTH, SPIN, TORQUE, Reading, Window
+from .signals import ADVANCE, DEPTH, PENETRATION, POWER, SPIN, TORQUE, Reading, Signals, Window
 
 S1, S2, S3 = (0.0, 20.0), (90.0, 110.0), (180.0, 200.0)
 DAMPINGS = {"1e-2": "vertical-c1-cd2", "1e-3": "vertical-c1-cd3", "1e-4": "vertical-c1-cd4", "1e-5": "vertical-c1-cd5"}
@@ -387,4 +388,320 @@ C1 = Case(
     ),
 )
 
-CASES = (V1, C1)
+
+# -- C2 ---------------------------------------------------------------------------------------------------------------
+END = 10000.0
+DRILLED, DEEPEST = 80.468, 1280.62
+"""Length of hole drilled and greatest r_z, as printed (m)."""
+STAGES = {"0 m": 0.0, "40 m": 40.0, "80 m": 80.0}
+"""How far into the curve (m) the bit is when a stage begins."""
+SETTLED: Window = (40.0, 120.0)
+PUBLISHED_POWER = 93.89
+"""T_0 Omega_0, kW."""
+NO_FRICTION: Mapping[str, Any] = {"contact.friction_static": 0.0, "contact.friction_dynamic": 0.0}
+STRAIGHT: Mapping[str, Any] = {
+    "model": "axial-torsional",
+    "top_drive.weight_on_bit": 68550.0,
+    "output.interval": 0.01,
+}
+
+
+def _rate(run: Signals, window: Window = SETTLED) -> float | None:
+    """Mean rate of penetration (m/s) in a window."""
+    part = run.part(DEPTH, window)
+    if len(part) < 2:
+        return None
+    return float((part[-1] - part[0]) / ((len(part) - 1) * (run.time[1] - run.time[0])))
+
+
+def _drilled(runs: Runs, begin: float = 0.0) -> float | None:
+    """Hole drilled (m) in 10 000 s from a start ``begin`` (m) into the curve: dx/dt = V(x), a parabola by stages."""
+    rates = [rate for name in STAGES if (rate := _rate(runs[name])) is not None]
+    if len(rates) < len(STAGES):
+        return None
+    x = np.linspace(begin, begin + 120.0, 2401)
+    speed = np.polyval(np.polyfit([*STAGES.values()], rates, 2), x)
+    if np.any(speed <= 0):
+        return None
+    elapsed = np.concatenate([[0.0], np.cumsum(np.diff(x) * (1 / speed[1:] + 1 / speed[:-1]) / 2)])
+    return float(np.interp(END, elapsed, x)) - begin
+
+
+def _over_nominal(drilled: float, scene: Scene) -> str:
+    return f"{100 * (drilled / (END * scene.nominal().rate_of_penetration) - 1):+.2f} % of nominal"
+
+
+def _depth_by_stages(runs: Runs) -> Value:
+    drilled = _drilled(runs)
+    return Value(drilled, "" if drilled is None else _over_nominal(drilled, runs.scene("0 m")))
+
+
+def _deepest_by_stages(runs: Runs) -> Value:
+    """r_z of the bit on the centreline, so much farther along the hole than at the start."""
+    drilled, seen, hole = _drilled(runs), runs["0 m"].picture(0.0), runs["0 m"].scene.borehole
+    if drilled is None or seen is None or hole is None:
+        return Value(None)
+    return Value(float(hole.frame(hole.nearest(seen["position"][-1:]) + drilled).position[0, 2]))
+
+
+def _rises(powers: list[float | None]) -> tuple[bool | None, str]:
+    found = [p / 1e3 for p in powers if p is not None]
+    if len(found) < len(powers):
+        return None, ""
+    return all(a < b for a, b in itertools.pairwise(found)), ", ".join(f"{p:.1f}" for p in found) + " kW"
+
+
+def _as_straight(curved: str, straight: str, window: Window) -> Check:
+    """Spin and axial speed of the bit are those in the straight hole, to a tenth of their means."""
+
+    def check(runs: Runs) -> tuple[bool | None, str]:
+        text, same = [], True
+        for name in (SPIN, ADVANCE):
+            one, other = runs[curved], runs[straight]
+            part = one.part(name, window)
+            if not len(part) or not len(other.part(name, window)):
+                return None, ""
+            at = one.time[(one.time >= window[0] - 1e-9) & (one.time <= window[1] + 1e-9)]
+            there = np.interp(at, other.time, other.values[name])
+            apart = float(np.sqrt(np.mean((part - there) ** 2)) / abs(there.mean()))
+            same = same and apart < 0.1
+            text.append(f"{SHORT[name]} {100 * apart:.2g} %")
+        return same, ", ".join(text) + " apart (rms)"
+
+    return check
+
+
+def _quiet(run: str, window: Window) -> Check:
+    """The string lies still on the wall: what it sinks in hardly changes."""
+
+    def check(runs: Runs) -> tuple[bool | None, str]:
+        part = runs[run].part(PENETRATION, window)
+        if not len(part):
+            return None, ""
+        swing = float(np.ptp(part))
+        return swing < 0.1 * max(
+            float(part.mean()), 1e-3
+        ), f"{1e3 * part.mean():.1f} mm into it, to {1e3 * swing:.2g} mm"
+
+    return check
+
+
+def _loads(run: str) -> tuple[Claim, ...]:
+    return (
+        of_scene("H0", "hook load H_0", run, 441.08, "6.3.6", _hook_load, unit="kN", digits=5, tolerance=1e-4),
+        of_scene(
+            "W0",
+            "weight W_0",
+            run,
+            68.55,
+            "6.3.6",
+            lambda s: s.nominal().weight_on_bit / 1e3,
+            unit="kN",
+            tolerance=1e-3,
+        ),
+    )
+
+
+def _stage_rate(name: str) -> Claim:
+    def measure(runs: Runs) -> Value:
+        rate = _rate(runs[name])
+        return Value(None if rate is None else 1e3 * rate)
+
+    what = f"{name} into the curve: rate of penetration"
+    return Claim(f"V {name}", what, 7.96454, "V_0 of W_0", measure, (name,), "mm/s", verdict=False)
+
+
+def _stage_power(runs: Runs) -> tuple[bool | None, str]:
+    return _rises([runs[name].mean(POWER, SETTLED) for name in STAGES])
+
+
+_NOT_PRINTED = (
+    "Not printed: the curve, the hole, how the bit is held in it, and what damps lateral motion. Here the curve "
+    "begins at 1200 m with 3 deg per 30 m, the hole is 8 1/2 in wide, the bit stays on its centreline, and a mud of "
+    "50 mPa s drags on the string: without it the string whirls ([curved-c2.md](curved-c2.md))."
+)
+_LATER: Window = (150.0, 250.0)
+
+C2_STAGES = Case(
+    "6-C2-stages",
+    ("curved-c2-stages",),
+    "Chapter 6, C2 in stages: at the start, 40 m and 80 m into the curve",
+    "10 000 s take half an hour of a core: here are 120 s of each of three stages, and what their rates of penetration "
+    "add up to in 10 000 s. The whole run is `drillfem reproduce 6-C2`. " + _NOT_PRINTED,
+    {
+        **{name: Run("curved-c2", {"hole.kick_off": 1200.0 - x}, 120.0) for name, x in STAGES.items()},
+        "straight": Run("vertical-c1-cd2", STRAIGHT, 120.0),
+    },
+    (
+        *_loads("0 m"),
+        Claim("depth", "hole drilled in 10 000 s", DRILLED, "6.3.6", _depth_by_stages, (*STAGES,), "m", 5, 0.02),
+        Claim("r_z", "greatest r_z", DEEPEST, "6.3.6", _deepest_by_stages, (*STAGES,), "m", 6, 1e-3),
+        Claim(
+            "early",
+            "hole drilled if the curve begins 20 m higher",
+            DRILLED,
+            "6.3.6",
+            lambda runs: Value(_drilled(runs, 20.0)),
+            (*STAGES,),
+            "m",
+            5,
+            verdict=False,
+        ),
+        *(_stage_rate(name) for name in STAGES),
+        statement("power", "the power of the top drive grows", STAGES, "6.3.6, fig. 6.19", _stage_power, "stages"),
+        statement(
+            "straight",
+            "not very different from the straight hole",
+            ("0 m", "straight"),
+            "6.3.6, fig. 6.18",
+            _as_straight("0 m", "straight", (0.0, 100.0)),
+            "0 m",
+        ),
+        statement(
+            "vanishes",
+            "low-frequency oscillations vanish",
+            "0 m",
+            "6.3.6, fig. 6.18",
+            dies_out("0 m", SPIN, (0.0, 20.0), (100.0, 120.0)),
+        ),
+        statement("quiet", "lateral vibrations die out", "80 m", "6.3.6", _quiet("80 m", (80.0, 120.0))),
+    ),
+    (
+        Experiment(
+            "What the thesis does not print",
+            ("depth", "V 0 m", "V 40 m", "V 80 m", "power"),
+            (
+                Variation("6 deg per 30 m", {"hole.radius": 286.5}, runs=(*STAGES,)),
+                Variation("1.5 deg per 30 m", {"hole.radius": 1146.0}, runs=(*STAGES,)),
+                Variation("hole of 10 in", {"hole.diameter": 0.254}, runs=(*STAGES,)),
+                Variation("k_s = 1e5 N/m2", {"contact.stiffness": 1e5}, runs=(*STAGES,)),
+                Variation("no friction", NO_FRICTION, runs=(*STAGES,)),
+                Variation("mud of 100 mPa s", {"mud.viscosity": 0.1}, runs=(*STAGES,)),
+                Variation("128 elements", {"mesh.elements": 128}, runs=(*STAGES,)),
+                Variation("2.5 ms steps", {"time.step": 2.5e-3}, runs=(*STAGES,)),
+                Variation("g = 9.81, H_0 as printed", {"gravity.magnitude": 9.81}, runs=(*STAGES,)),
+            ),
+            "",
+        ),
+        Experiment(
+            "What damps lateral motion",
+            ("V 0 m",),
+            (
+                Variation("150 to 250 s", {}, None, Reading(window=_LATER), 250.0, ("0 m",)),
+                Variation("no mud", {"mud": None}, None, Reading(window=_LATER), 250.0, ("0 m",)),
+                Variation(
+                    "no mud, no friction", {"mud": None, **NO_FRICTION}, None, Reading(window=_LATER), 250.0, ("0 m",)
+                ),
+            ),
+            "",
+            explains=False,
+        ),
+    ),
+    nearby=(),
+)
+
+
+def _whole(runs: Runs, from_start: bool) -> Value:
+    drilled = runs["C2"].at(DEPTH, END)
+    if drilled is None:
+        return Value(None)
+    if from_start:
+        return Value(drilled, _over_nominal(drilled, runs["C2"].scene))
+    seen, hole = runs["C2"].picture(0.0), runs["C2"].scene.borehole
+    assert seen is not None and hole is not None
+    return Value(drilled + float(hole.nearest(seen["position"][-1:])[0]) - runs["C2"].scene.length)
+
+
+def _deepest(runs: Runs) -> Value:
+    seen = runs["C2"].picture(END)
+    return Value(None if seen is None else float(seen["position"][:, 2].max()))
+
+
+def _whole_power(runs: Runs) -> tuple[bool | None, str]:
+    return _rises([runs["C2"].mean(POWER, (t, t + 1000.0)) for t in (0.0, 3000.0, 6000.0, 9000.0)])
+
+
+def _first_power(runs: Runs) -> Value:
+    power = runs["C2"].mean(POWER, (0.0, 100.0))
+    return Value(None if power is None else power / 1e3)
+
+
+def _follows(runs: Runs) -> tuple[bool | None, str]:
+    """The string lies within the hole, but for what it sinks into the wall: farthest from its centreline (mm)."""
+    text, inside = [], True
+    for t in (1000.0, 5000.0, END):
+        seen = runs["C2"].picture(t)
+        if seen is None:
+            return None, ""
+        least = float(seen["wall_gap"].min())
+        room = 0.5 * (
+            (runs["C2"].scene.hole.diameter or 0.0) - min(s.outer_diameter or 0.0 for s in runs["C2"].scene.string)
+        )
+        inside = inside and -least < room
+        text.append(f"{seen['position'][-1, 0]:.2f} m")
+    return inside, "bit " + ", ".join(text) + " from the vertical at 1000, 5000, 10 000 s"
+
+
+def _local(runs: Runs) -> tuple[bool | None, str]:
+    """The bending moment changes near the bit, and hardly elsewhere."""
+    seen = runs["C2"].picture(END)
+    if seen is None:
+        return None, ""
+    s, m = seen["arc_length"], seen["bending_moment"]
+    low = s > 1050.0
+    upper, lower = float(m[~low].max()), float(m[low].max())
+    return lower > 10 * upper, f"up to {lower / 1e3:.2g} kN m below 1050 m, {upper / 1e3:.2g} kN m above"
+
+
+C2 = Case(
+    "6-C2",
+    ("curved-c2",),
+    "Chapter 6, C2: 10 000 s of drilling into a curve",
+    "The whole run; by name (or with `all`) only, for it takes half an hour of a core. " + _NOT_PRINTED,
+    {"C2": Run("curved-c2"), "straight": Run("vertical-c1-cd2", STRAIGHT, 200.0)},
+    (
+        *_loads("C2"),
+        Claim("depth", "hole drilled in 10 000 s", DRILLED, "6.3.6", lambda r: _whole(r, True), ("C2",), "m", 5, 0.02),
+        Claim(
+            "from 1200",
+            "the same, counted from 1200 m",
+            DRILLED,
+            "6.3.6",
+            lambda r: _whole(r, False),
+            ("C2",),
+            "m",
+            5,
+            verdict=False,
+            because="not what print means: r_z of 1280.62 m is deeper than 1200 + 80.468 m",
+        ),
+        Claim("r_z", "greatest r_z", DEEPEST, "6.3.6", _deepest, ("C2",), "m", 6, 1e-3),
+        Claim(
+            "P", "power at the start, 0 to 100 s", PUBLISHED_POWER, "T_0 Omega_0", _first_power, ("C2",), "kW", 4, 0.02
+        ),
+        statement("power", "it grows", "C2", "6.3.6, fig. 6.19", _whole_power),
+        statement("follows", "the string gets curved, as the well", "C2", "6.3.6, fig. 6.16", _follows),
+        statement("bending", "bending moments change where it touches", "C2", "6.3.6, fig. 6.17", _local),
+        statement(
+            "straight",
+            "not very different from the straight hole",
+            ("C2", "straight"),
+            "6.3.6, fig. 6.18",
+            _as_straight("C2", "straight", (0.0, 200.0)),
+            "C2",
+        ),
+        statement(
+            "vanishes",
+            "low-frequency oscillations vanish",
+            "C2",
+            "6.3.6, fig. 6.18",
+            dies_out("C2", SPIN, (0.0, 20.0), (9000.0, END)),
+        ),
+        statement("quiet", "lateral vibrations die out", "C2", "6.3.6", _quiet("C2", (9900.0, END))),
+    ),
+    (),
+    nearby=(),
+)
+
+CASES = (V1, C1, C2_STAGES)
+LONG = (C2,)
+"""Cases for which there must be time: they are run by name, or with all."""

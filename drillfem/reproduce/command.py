@@ -9,7 +9,7 @@ from rich.console import Console
 
 from drillfem.errors import SceneError
 
-from .compare import CASES, reproduce
+from .compare import CASES, LONG, reproduce
 from .page import count, markdown, show
 
 
@@ -28,7 +28,8 @@ def run(cases: list[str], out: Path | None, docs: Path | None, imitate: bool, br
     if len(reports) > 1:
         print(f"all cases: {count(row for report in reports for row in report.rows)}")
     if docs is not None:
-        named = [] if len(reports) == len(CASES) else [report.case.name for report in reports]
+        whole = {len(CASES): [], len(CASES) + len(LONG): ["all"]}
+        named = whole.get(len(reports), [report.case.name for report in reports])
         options = [name for name, on in (("--imitate", imitate), ("--brief", brief)) if on]
         command = shlex.join(["drillfem", "reproduce", *named, *options, "--docs", str(docs)])
         docs.write_text(markdown(reports, imitate, command), encoding="utf-8")

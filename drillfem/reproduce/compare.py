@@ -21,7 +21,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CASES: tuple[Case, ...] = (*chapter4.CASES, *chapter5.CASES, *chapter6.CASES, *appendix_b.CASES)
-"""All cases, in the order of the thesis."""
+"""What is compared if nothing is named, in the order of the thesis."""
+
+LONG: tuple[Case, ...] = chapter6.LONG
+"""What is compared by name, or with ``all``, only."""
 
 IMITATION = Numerics()
 """What the column *imitated* is computed with: BDF2 at 1 ms, 64 linear SUPG elements for the rock."""
@@ -118,8 +121,8 @@ class Studio:
             scene = load_scene(run.scene, changes)
             start = time.perf_counter()
             out = self.out / folder if self.out and variation is None else None
-            # a variation is made to be wrong; a scene as shipped may well be warned about
-            history, fields = self._run(scene, v, until, out, warn=variation is None)
+            # what is changed may be made to be wrong; a scene as shipped may well be warned about
+            history, fields = self._run(scene, v, until, out, warn=variation is None and not run.changes)
             self._done[key] = Signals.of(scene, history, time.perf_counter() - start, fields)
         return self._done[key].read_as(v.reading)
 
@@ -168,18 +171,20 @@ class Family:
 
 
 def find_cases(names: Iterable[str]) -> list[Case]:
-    """Cases by their names or those of their scenes, in small letters or capitals; all if none is named.
+    """Cases by their names or those of their scenes, in small letters or capitals; `CASES` if none is named.
 
-    Raises SceneError.
+    ``all``: with the `LONG` ones. Raises SceneError.
     """
-    by_name = {name.lower(): case for case in CASES for name in (case.name, *case.aliases)}
+    every = (*CASES, *LONG)
+    by_name = {name.lower(): case for case in every for name in (case.name, *case.aliases)}
     found: list[Case] = []
     for name in names:
-        if name.lower() not in by_name:
-            known = ", ".join(f"{case.name} ({case.aliases[0]})" for case in CASES)
-            raise SceneError(f"case {name!r}: must be one of {known}")
-        if by_name[name.lower()] not in found:
-            found.append(by_name[name.lower()])
+        if name.lower() not in (*by_name, "all"):
+            known = ", ".join(f"{case.name} ({case.aliases[0]})" for case in every)
+            raise SceneError(f"case {name!r}: must be one of {known}, all")
+        for case in every if name.lower() == "all" else (by_name[name.lower()],):
+            if case not in found:
+                found.append(case)
     return found or list(CASES)
 
 

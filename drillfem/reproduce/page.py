@@ -118,6 +118,12 @@ FINDINGS = """What comes out:
 - What hangs on the thesis' mesh and backward differences: the strong side lines at 60 to 80 s (V2), that the bit never
   turns back in C2-B, the last 0.03 Hz and 50 N m of C2-A, and the mixture of lines that lasts at 1e-5 s (6-C1). The
   first-order formula, or large steps, would have hidden the thesis' main finding, 7.40 Hz (C1).
+- Chapter 4 comes out as stated, with 60 deg for the inclination that is in a figure: rod and soft string agree when
+  they swing steadily, if both take the speed of the touching point for their friction (4-startup). The calibration
+  returns what is put in (4-contact).
+- C2 of chapter 6 drills 1.3 % less than print, which lies above the nominal rate for no reason that we found; all else
+  is as stated, but only with a mud that drags on the string: without it the string whirls and nothing is drilled
+  (6-C2-stages, 6-C2).
 - What hangs on chance, so that print is one of several outcomes: which line leads at alpha = 0.8 (V2), and which
   vibration wins at 1e-5 s (6-C1)."""
 
@@ -129,20 +135,22 @@ def markdown(reports: Sequence[Report], imitated: bool, command: str) -> str:
 
 Written by `{command}`.
 
-Every number and statement that H. Goicoechea Manuel's thesis prints about chapter 5 (lumped model M1 or A, torsional
-model M2 or B) and the vertical string of chapter 6 (M3), with ours, computed as the scenes are shipped. {count(rows)}.
+Every number and statement that H. Goicoechea Manuel's thesis prints about chapter 4 (CR the rod, R the soft string),
+chapter 5 (lumped model M1 or A, torsional model M2 or B), chapter 6 (M3) and appendix B.1.4, with ours, computed as the
+scenes are shipped. {count(rows)}.
 
 *Agrees*: within 1 % (frequencies), 2 % (torques, depths, dimensionless numbers), 10 % (amplitudes). *Within
 resolution*: within half a line of the spectrum that print was read from. *Within scatter*: print lies in the range of
 four starts that differ by a thousandth. For what differs, the reason names the experiments below that give
-the printed value: they are run by the same command. Lines are tops of Hann-windowed, padded spectra."""
+the printed value: they are run by the same command. Lines are tops of Hann-windowed, padded spectra. Where the source
+is a formula, print is what the thesis' own equations come to."""
     if imitated:
         about += (
             f" *Imitated*: the same runs with numerics like the thesis': BDF2 for string and rock (here at "
             f"{1e3 * IMITATION.step:g} ms; its steps are not printed), {IMITATION.elements} linear SUPG elements for "
-            "the rock, and in chapter 5 its 64 quadratic elements for the string."
+            "the rock, and in chapter 5 its 64 quadratic elements for the string; straight strings only."
         )
-    parts = [about] if len(reports) < len(CASES) else [about, FINDINGS]
+    parts = [about, FINDINGS] if len(reports) >= len(CASES) else [about]
     for report in reports:
         table = _markdown(_header(imitated), (_cells(row, imitated) for row in report.rows), (1, 3))
         parts.append(f"## {report.case.title}\n\n{report.case.text}\n\n{table}\n\n{count(report.rows)}.")

@@ -69,9 +69,7 @@ class Signals:
         i = int(np.argmin(np.abs(at - time)))
         if abs(at[i] - time) > self.scene.output.fields_interval:
             return None
-        return {
-            str(name): x.values[i] if "time" in x.dims else x.values for name, x in self.fields.data_vars.items()
-        }
+        return {str(name): x.values[i] if "time" in x.dims else x.values for name, x in self.fields.data_vars.items()}
 
     def side_load(self, time: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         """Arc lengths (n,) in m, and the wall's normal force (n,) there over the weight per length of the string.

@@ -156,7 +156,7 @@ def along(scene: Scene) -> tuple[F8, Frame] | None:
     """Measured depths (m,) along the string and the hole there; None for a hole along e3, or none."""
     if not scene.hole.bends or scene.borehole is None:
         return None
-    at = np.linspace(0.0, scene.length, 4001)
+    at: F8 = np.linspace(0.0, scene.length, 4001)  # type: ignore[assignment]
     return at, scene.borehole.frame(at)
 
 

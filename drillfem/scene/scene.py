@@ -435,6 +435,8 @@ class Scene:
         elif time.integrator not in ("default", *(allowed := self._integrators())):
             on = self._kind_of_run() if time.engine == "default" else f"time.engine = {time.engine!r}"
             yield "time.integrator", f"must be one of default, {', '.join(allowed)} for {on}"
+        elif time.adaptive and self.contact is not None and self.contact.method == "augmented":
+            yield "time.adaptive", "must be false where contact.method = 'augmented', which counts with equal steps"
         elif time.adaptive and self.engine != "petsc":
             yield "time.adaptive", f"must be false where time.engine = {self.engine!r}, whose steps are equal"
         if time.integrator == "arkimex" and not 2 <= time.order <= 5:
@@ -455,7 +457,10 @@ class Scene:
         if model == "soft-string":
             return ("soft-string",)
         if not self.condensable:
-            return ("petsc", "compiled") if self.time.analysis == "dynamic" else ("petsc",)
+            if self.time.analysis == "static":
+                return ("petsc",)
+            # in a hole that bends every step is dear, and the two give the same
+            return ("compiled", "petsc") if self.hole.bends and self.contact else ("petsc", "compiled")
         if model == "axial-torsional":
             return ("condensed", "petsc", "compiled")
         waves = model == "torsional" and not any(s.retardation_time for s in self.string)
@@ -466,7 +471,8 @@ class Scene:
         """The engine that runs the scene: the one asked for, else the first that knows the integrator."""
         if self.time.engine != "default":
             return self.time.engine
-        knows = (e for e in self.engines if self.time.integrator in ("default", *ENGINES[e]))
+        steps = self.engines if not self.time.adaptive else [e for e in self.engines if e == "petsc"]
+        knows = (e for e in steps if self.time.integrator in ("default", *ENGINES[e]))
         return next(knows, self.engines[0])
 
     def _integrators(self) -> tuple[str, ...]:

@@ -228,6 +228,7 @@ class Marcher(ABC):
         self._fresh = False
         self.rejected += refused
         if why:
+            why = self.newton.complaint or why
             raise SimulationError(
                 f"no time step succeeds at t = {t:.6g} s ({why}, step down to {self.length:.2g} s): "
                 "try a smaller time.step or another time.integrator"

@@ -16,7 +16,8 @@ from .statics import Statics
 log = logging.getLogger("drillfem")
 
 #: Springs to the centreline that are let go one after the other, as multiples of the heaviest section's weight per
-#: length (with what a pull at the tip presses in a bend) and metre of clearance: the first hold the string off the wall, the last ones no longer count.
+#: length (with what a pull at the tip presses in a bend) and metre of clearance: the first hold the string off the
+#: wall, the last ones no longer count.
 _SUPPORTS = (3e1, 3e0, 1e0, 3e-1, 1e-1, 3e-2, 1e-2, 1e-3, 1e-4, 0.0)
 
 

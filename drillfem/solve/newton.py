@@ -202,6 +202,8 @@ class BitCoupledNewton:
         self.rod, self.bit, self.keep = rod, bit, keep
         self.iterations = 0
         self.factorisations = 0
+        #: what kept the last solve from ending well, besides Newton's method
+        self.complaint = ""
         #: start from the last three solutions; no guide where a step has several stages
         self.extrapolate = True
         #: where the bit was at the last accepted step
@@ -295,6 +297,7 @@ class BitCoupledNewton:
             x1, x2, x3 = self._history
             _extrapolate(x1, x2, x3, x)
         load, there = self._load.copy(), rod.there()
+        self.complaint = ""
         outcome = self._iterate(system, x)
         for _ in range(_MOST_UPDATES):
             if outcome is not Outcome.CONVERGED or not rod.augment(system.shift()):
@@ -302,6 +305,10 @@ class BitCoupledNewton:
             outcome = self._iterate(system, x)
         else:
             outcome = Outcome.SLOW
+            self.complaint = (
+                f"contact.method = 'augmented' is not content after {_MOST_UPDATES} updates of its multipliers: a "
+                "larger contact.stiffness or penetration_tolerance helps"
+            )
         if outcome is Outcome.CONVERGED:
             self._history = [x.copy(), *self._history[:2]]
         else:

@@ -107,7 +107,7 @@ class Sliding(Statics):
                 step /= 2
                 if step < _STEPS[1]:
                     raise SimulationError(
-                        f"{operation.title}: no equilibrium beyond {100 * done:.3g} % of its loads and friction ({error})"
+                        f"{operation.title}: no equilibrium beyond {100 * done:.3g} % of loads and friction ({error})"
                     ) from None
                 continue
             done, step = share, 1.5 * step

@@ -116,10 +116,14 @@ def test_tangent_moves_with_its_coefficients(case: str, name: str) -> None:
             array.reshape(-1, 11)[:, 9] *= 1.5
         else:
             array[...] = 1.5 * kept
+        if name == "friction" and rod.wall:
+            rod.wall.go_to(rod.wall.p)  # what is known of the hole is read again
         after = tangent(rod, u, u_dot, direction)
         assert mismatch(rod, u, u_dot) < 2e-9
     finally:
         array[...] = kept
+        if name == "friction" and rod.wall:
+            rod.wall.go_to(rod.wall.p)
     planar_moment = case == "planar" and name == "tip moment"  # about a fixed axis its virtual work is linear
     change = abs(after - before).max() / abs(before).max()
     assert (change == 0.0) if planar_moment else (change > 1e-12)

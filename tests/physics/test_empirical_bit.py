@@ -132,7 +132,7 @@ def short(**overrides: Any) -> Scene:
         "string.0.length": 10.0,
         "top_drive.weight_on_bit": 1e5,
         "mesh.elements": 1,
-        "time.step": 0.01,
+        "time.step": 0.02,
         "time.end": 20.0,
         "output.interval": 0.1,
     }

@@ -136,6 +136,27 @@ def test_a_sliding_pipe(speed: float, spin: float) -> None:
     assert math.atan2(-offset @ np.cross(t, down), offset @ down) == pytest.approx(climbs, abs=1e-3)
 
 
+def test_break_off_torque() -> None:
+    """A string that is about to turn in well A: mu_s r times the soft string's side forces, less 1/sqrt(1 + mu_s^2) for
+    it climbs before it slips."""
+    length, radius, kick_off, final = 2500.0, 573.0, 1500.0, math.pi / 3
+    case = pipe(
+        string=[PIPE | {"length": length}],
+        hole={"kind": "build", "kick_off": kick_off, "radius": radius, "final_inclination": final, "inclination": 0.0},
+        contact={"friction_dynamic": MU / 2},
+        mesh={"elements": 200},
+    )
+    rod = Rod(case)
+    found = Sliding(rod, "static").operate(lay(rod), Operation("", "", spin=1.0)).surface_torque
+    s = np.linspace(0, length, 100_001)
+    w, end = case.string[0].mass_per_length * case.gravity.magnitude, kick_off + radius * final
+    i = np.clip((s - kick_off) / radius, 0, final)
+    F = w * (length - end) * math.cos(final) + w * radius * (math.sin(final) - np.sin(i))
+    side = np.abs(w * np.sin(i) - F * ((s > kick_off) & (s < end)) / radius)
+    soft = MU * case.string[0].contact_radius * float(np.trapezoid(side, s))
+    assert found == pytest.approx(soft / math.hypot(1, MU), rel=5e-3)
+
+
 # -- in time ----------------------------------------------------------------------------------------------------------
 
 

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drillfem.errors import SceneError, SimulationError
 from drillfem.models.rod import Rod
 from drillfem.scene import Scene
+from drillfem.solve import newton
 from drillfem.solve.direct import DirectRun
 
 STEEL = {"youngs_modulus": 210e9, "shear_modulus": 77e9, "density": 7850.0}
@@ -129,6 +131,19 @@ def test_a_run_goes_on_from_its_multipliers() -> None:
     assert np.array_equal(first.stepper.u, second.stepper.u)
     for run in (first, second):
         run.destroy()
+
+
+def test_multipliers_that_do_not_settle(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step without end says whose fault it is, and what to change; steps that adapt are refused at once."""
+    monkeypatch.setattr(newton, "_MOST_UPDATES", 1)
+    run, t = DirectRun(Rod(falling(PERIOD / 8, 1.0, "augmented", **ALPHA))), 0.0
+    with pytest.raises(SimulationError, match=r"no time step succeeds .*'augmented' is not content after 1 updates"):
+        while t < 1.0 - 1e-9:
+            t = run.step(1.0)
+    assert t > 0.08  # the fall
+    run.destroy()
+    with pytest.raises(SceneError, match=r"time\.adaptive.*must be false where contact\.method = 'augmented'"):
+        falling(1e-3, 1.0, "augmented", adaptive=True)
 
 
 # -- a string ---------------------------------------------------------------------------------------------------------

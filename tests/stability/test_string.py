@@ -27,7 +27,6 @@ SPOKEN = {
     "off-bottom": ("takes up a kink of the hole", "never sticks"),
     "off-bottom-soft-string": ("never sticks",),
     # 150 elements on 3000 m
-    "vertical-pi": ("cannot see the string buckle",),
 }
 
 

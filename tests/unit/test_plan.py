@@ -11,11 +11,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from drillfem import cli
 from drillfem.errors import SceneError
 from drillfem.plan import as_text, plan_of
-from drillfem.plan.pilot import Signal, deviation
+from drillfem.plan.pilot import Pilot, Signal, _laid, deviation
+from drillfem.plan.survey import _rung
+from drillfem.results import Result
 from drillfem.scene import Scene, load_scene
 from drillfem.scene.ladder import (
     MODELS,
@@ -414,6 +417,33 @@ def test_plan_of_a_buckled_string_asks_for_a_mesh_that_sees_it() -> None:
     assert any("no [contact]" in note for note in bare.notes)
     fine = load_scene("vertical-c1-cd4", {"top_drive.weight_on_bit": "70 kN", "mesh.elements": 620})
     assert not any(note.startswith("mesh:") for note in plan_of(fine, pilot=False).notes)
+
+
+def test_a_curved_hole_has_the_soft_string_beside_the_ladder() -> None:
+    scene = load_scene("off-bottom")
+    plan = plan_of(scene, pilot=False)
+    assert plan.chosen == "spatial" and [r.model for r in plan.beside] == ["soft-string"]
+    text = as_text(plan)
+    assert "soft-string" in text and "beside the ladder" in text and "bending stiffness" in text
+    assert [r["model"] for r in json.loads(json.dumps(plan.to_dict()))["beside"]] == ["soft-string"]
+    # a bit in rock is more than it can do; a vertical hole needs no such friction
+    assert plan_of(load_scene("curved-c2"), pilot=False).beside == ()
+    assert plan_of(load_scene("vertical-pi"), pilot=False).beside == ()
+
+
+def test_the_soft_string_is_measured_by_its_side_force() -> None:
+    """Of the inclination alone: the formula's sum is 0.8 % less (and the rod's with it)."""
+
+    def at_start(model: str, side_force: float) -> dict[str, Any]:
+        history = xr.Dataset({"side_force": ("time", [side_force, 0.0])}, {"time": [0.0, 1.0]})
+        return {model: Result(history, {})}
+
+    laid = _laid(at_start("soft-string", 242.0), at_start("spatial", 240.0))
+    assert laid == {"soft-string": pytest.approx(2 / 240)}
+    assert _laid(at_start("soft-string", 242.0), {}) == {} and _laid({}, at_start("spatial", 240.0)) == {}
+    pilot = Pilot(1.0, laid=laid, speed={"soft-string": 10.0})
+    rung = _rung(load_scene("off-bottom"), "soft-string", (), pilot)
+    assert rung.off == pytest.approx(2 / 240) and rung.wall == pytest.approx(10.0)
 
 
 def test_plan_of_an_asked_model_says_what_auto_would_take() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from drillfem.errors import SceneError
 from drillfem.render import render_result, style
 from drillfem.render.charts import rows_of
 from drillfem.render.film import start_up
@@ -18,7 +19,7 @@ from drillfem.render.story import Story
 from drillfem.render.well import Well, WellBrush
 from drillfem.render.well_charts import along_page, clearance_page
 from drillfem.render.well_view import Dial, dial_places, facts_at
-from drillfem.scene import Scene
+from drillfem.scene import Scene, load_scene
 
 LENGTH, KICK, SHOE = 400.0, 150.0, 250.0
 RIGHT, LOW = 5e-3, 20e-3  # m: where the string lies
@@ -195,3 +196,17 @@ def test_a_string_on_the_axis_has_no_clearance_to_show(tmp_path: Path) -> None:
     story = Story(result(aside=False, poses=3))
     assert clearance_page(story, "side_force", 2, tmp_path / "clearance.png") is None
     assert along_page(story, [0, 2], tmp_path / "along.png").exists()
+
+
+def test_an_unknown_demo_is_refused(tmp_path: Path) -> None:
+    from drillfem.demo import main
+
+    with pytest.raises(SceneError, match="must be one of drilling, well"):
+        main(tmp_path, "nothing")
+
+
+def test_the_scene_of_the_demo_carries_its_survey() -> None:
+    """A result needs no file: the rows of the survey are in the scene."""
+    given = load_scene("survey-p11-a-02")
+    assert given.hole.survey is not None and len(given.hole.survey) == 91
+    assert Scene.from_dict(given.to_dict()) == given
