@@ -148,6 +148,6 @@ def helix(betas: F8) -> list[Wave]:
 def equal_energy() -> float:
     """Load beta at which a snaking string and a helix have the same energy: 2 beta = 2.90 stands where 2.83 does
     against the straight string."""
-    at = np.linspace(1.3, 1.6, 31)
+    at = np.linspace(1.4, 1.5, 6)
     gain = np.array([a.energy - b.energy for a, b in zip(snake(at), helix(at[::-1])[::-1], strict=True)])
     return float(brentq(lambda beta: float(np.interp(beta, at, gain)), at[0], at[-1]))

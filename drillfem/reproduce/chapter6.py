@@ -581,7 +581,7 @@ C2_STAGES = Case(
                 Variation("2.5 ms steps", {"time.step": 2.5e-3}, runs=(*STAGES,)),
                 Variation("g = 9.81, H_0 as printed", {"gravity.magnitude": 9.81}, runs=(*STAGES,)),
             ),
-            "",
+            "The rows show what each of them changes.",
         ),
         Experiment(
             "What damps lateral motion",
@@ -593,7 +593,7 @@ C2_STAGES = Case(
                     "no mud, no friction", {"mud": None, **NO_FRICTION}, None, Reading(window=_LATER), 250.0, ("0 m",)
                 ),
             ),
-            "",
+            "The rows show what each of them changes.",
             explains=False,
         ),
     ),

@@ -74,7 +74,7 @@ def test_shapes_on_the_wall() -> None:
 # -- onset ------------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(("clearance", "load", "wave"), [(0.0100, 370.5e3, 16.5), (0.0445, 175.7e3, 24.0)])
 def test_level_string_snakes_where_theory_says(clearance: float, load: float, wave: float) -> None:
-    column = pinned(6, clearance, spacing=4.0, degree=2)
+    column = pinned(6, clearance, spacing=3.0)
     pipe = pipe_of(column.rod.scene)
     exact, halves = pinned_onset(pipe, column.rod.length)
     found = find_onset(column, column.lying(), 0.9 * exact, 2 * exact)
@@ -99,7 +99,7 @@ def test_weight_along_the_hole_counts(degrees: float) -> None:
     angle = math.radians(degrees)
     pipe = pipe_of(pipe_scene(1.0, angle, 0.0445))
     length = 5 * pipe.wave if degrees else 8 * pipe.scale
-    column = Column(Rod(pipe_scene(length, angle, 0.0445, length / 60, 2)), pinned=True)
+    column = Column(Rod(pipe_scene(length, angle, 0.0445, length / 40)), pinned=True)
     theory = onset(pipe_of(column.rod.scene), length)
     found = find_onset(column, column.lying(), 0.95 * theory, 2 * theory)
     assert found is not None
@@ -110,7 +110,7 @@ def test_weight_along_the_hole_counts(degrees: float) -> None:
 
 
 def test_stiffness_is_the_slope_of_the_force_and_force_that_of_the_energy() -> None:
-    column = pinned(2, spacing=3.0)
+    column = pinned(2, spacing=3.0, stiffness=1e6)
     pipe = pipe_of(column.rod.scene)
     x = column.settle(column.lying(), 1.3 * pipe.snaking)
     column.push(1.5 * pipe.snaking)  # no longer an equilibrium
@@ -139,11 +139,11 @@ def test_stiffness_is_the_slope_of_the_force_and_force_that_of_the_energy() -> N
     flat, step = motion.reshape(-1)[free], 1e-6 / np.abs(motion).max()
     slope = (force(moved(step)) - force(moved(-step))) / (2 * step)
     stiffness = column.tangent(x) @ flat
-    np.testing.assert_allclose(slope, stiffness, atol=1e-3 * np.abs(stiffness).max())
+    np.testing.assert_allclose(slope, stiffness, atol=5e-3 * np.abs(stiffness).max())
     step *= 10
     work = (column.energy(moved(step)) - column.energy(moved(-step))) / (2 * step)
     assert work == pytest.approx(force(x) @ flat, rel=1e-3)
-    assert abs(work) > 1.0
+    assert abs(work) > 1e-2
 
 
 # -- beyond -----------------------------------------------------------------------------------------------------------
@@ -183,7 +183,7 @@ def test_command_pushes_a_scene(tmp_path: Path, capsys: pytest.CaptureFixture[st
         """
         [[string]]
         name = "pipe"
-        length = 90
+        length = 60
         outer_diameter = 0.127
         inner_diameter = 0.108
         [material]
@@ -204,7 +204,7 @@ def test_command_pushes_a_scene(tmp_path: Path, capsys: pytest.CaptureFixture[st
         [initial]
         state = "laid"
         [mesh]
-        elements = 30
+        elements = 20
         [time]
         end = 1
         step = 0.01
@@ -222,7 +222,7 @@ def test_command_pushes_a_scene(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert main(["buckling", str(scene), "--out", str(tmp_path / "x"), "--weight-on-bit", "0"]) == 2
     assert main(["buckling", str(scene), "--out", str(tmp_path / "x"), "--weight-on-bit", "9 kN", "--steps", "0"]) == 2
     assert not (tmp_path / "x").exists()
-    loaded = load_scene(scene, {"mesh.elements": 6})
+    loaded = load_scene(scene, {"mesh.elements": 4})
     assert coarse(load_scene(scene), line_of(loaded), 450e3) == []
     (text,) = coarse(loaded, line_of(loaded), 450e3)
     assert "cannot see the string buckle" in text
@@ -230,8 +230,8 @@ def test_command_pushes_a_scene(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 # -- long -------------------------------------------------------------------------------------------------------------
 @pytest.mark.verify
-@pytest.mark.parametrize(("degree", "spacings", "order"), [(1, (1.0, 0.5), 4), (2, (5.0, 3.0), 8), (3, (4.0, 2.0), 4)])
-def test_onset_converges(degree: int, spacings: tuple[float, float], order: float) -> None:
+@pytest.mark.parametrize(("degree", "spacings"), [(1, (2.0, 1.0)), (2, (4.0, 2.0)), (3, (4.0, 2.5))])
+def test_onset_converges_with_twice_the_degree(degree: int, spacings: tuple[float, float]) -> None:
     errors, lengths = [], []
     for spacing in spacings:
         column = pinned(10, spacing=spacing, degree=degree)
@@ -240,21 +240,18 @@ def test_onset_converges(degree: int, spacings: tuple[float, float], order: floa
         assert found is not None
         errors.append(found.load / exact - 1)
         lengths.append(column.rod.length / column.rod.scene.mesh.elements)
-    fitted = math.log(errors[0] / errors[1]) / math.log(lengths[0] / lengths[1])
-    assert fitted == pytest.approx(order, abs=0.8)
+    order = math.log(errors[0] / errors[1]) / math.log(lengths[0] / lengths[1])
+    assert order == pytest.approx(2 * degree, abs=0.3)
 
 
 @pytest.mark.verify
-def test_linear_elements_of_twelve_metres_do_not_see_the_waves() -> None:
-    halves = {}
-    for spacing in (12.5, 2.0):
-        column = pinned(10, spacing=spacing, degree=1)
-        pipe = pipe_of(column.rod.scene)
-        found = find_onset(column, column.lying(), 0.9 * pipe.snaking, 2 * pipe.snaking)
-        assert found is not None
-        way = found.motion[column.rod.nodes, 1]
-        halves[spacing] = int((np.diff(np.sign(way[1:-1])) != 0).sum()) + 1
-    assert halves[12.5] == 10 and halves[2.0] in (19, 20)  # of 20
+def test_linear_elements_of_twelve_metres_do_not_see_it() -> None:
+    column = pinned(10, spacing=12.5, degree=1)
+    pipe = pipe_of(column.rod.scene)
+    x = column.equilibrium(column.lying(), 1.5 * pipe.snaking)
+    assert column.softest(x)[0] > 0  # a string that should long have wound up
+    fine = pinned(10, spacing=2.0, degree=1)
+    assert fine.softest(fine.equilibrium(fine.lying(), 1.1 * pipe.snaking))[0] < 0
 
 
 @pytest.mark.verify

@@ -253,3 +253,46 @@ def test_command(tmp_path, monkeypatch, capsys):
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["chart-lumped.json", "chart-lumped.png"]
     assert Chart.read(tmp_path / "out" / "chart-lumped.json").quick
     assert "condensed, exact surface" in capsys.readouterr().out
+
+
+@pytest.mark.dolfinx
+def test_off_bottom(tmp_path):
+    pytest.importorskip("dolfinx")
+    from drillfem.chart import off_bottom
+
+    effort = replace(
+        off_bottom.QUICK, horizon=0.2, elements=50, laid=(50, 100, 200), stiffness=(1e6,), panels=("laid",)
+    )
+    # the engines take the same steps; each march starts where the string was laid
+    kept = off_bottom.Well(effort, time__engine="compiled")
+    rows, _ = kept.march(step=1e-2)
+    again, _ = kept.march(step=1e-2)
+    other, _ = off_bottom.Well(effort, time__engine="petsc").march(step=1e-2)
+    for name in ("top torque", "side force"):
+        assert len(rows[name]) == 10 and rows[name] == pytest.approx(again[name], rel=1e-9)
+        assert rows[name] == pytest.approx(other[name], rel=1e-6)
+    chart = off_bottom.chart(effort)
+    (laid,) = chart.panels
+    check_front(laid)
+    # all of it rests on the wall, and a finer mesh lays it better
+    assert kept.stands().sum() == pytest.approx(240.7e3, rel=1e-3)
+    coarse, fine = laid.series["penalty 1e+06 N/m2"]
+    assert fine.error < coarse.error < 0.1
+    assert draw(chart, tmp_path / "chart.png").stat().st_size > 20_000
+
+
+@pytest.mark.slow
+@pytest.mark.dolfinx
+def test_off_bottom_over_steps():
+    pytest.importorskip("dolfinx")
+    from drillfem.chart import off_bottom
+
+    chart = off_bottom.chart(replace(off_bottom.QUICK, panels=("steps",), dear_steps=(1e-2,)))
+    series = chart.panel("steps").series
+    at = {name: {p.size: p for p in points}[1e-2] for name, points in series.items()}
+    same = [at[name] for name in ("compiled, generalised-alpha 0.9", "compiled, full Newton", "PETSc, full Newton")]
+    assert same[0].error == pytest.approx(same[1].error, rel=1e-3) == pytest.approx(same[2].error, rel=1e-3)
+    assert same[0].cpu < same[2].cpu and chart.facts["steps: PETSc over compiled, CPU, least"] > 1
+    for name in ("generalised-alpha 0.9", "trapezoidal rule"):
+        errors = [p.error for p in series[f"compiled, {name}"]]
+        assert errors[0] > 2 * errors[-1] and errors[-1] < 0.02
