@@ -399,7 +399,7 @@ from drillfem.boreholes import build, find, read_survey, survey
 
 well_a = build(2500, kick_off=1500, radius=572.96, final_inclination=1.0472, diameter=0.2159)
 real = survey(read_survey(find("p11-a-02")), diameter=0.2159)
-frame = real.frame([1000.0, 2000.0])    # position, tangent, curvature, inclination, azimuth, dogleg_severity, radius
+frame = real.frame([1000.0, 2000.0])  # position, tangent, curvature, inclination, azimuth, dogleg_severity, radius
 ```
 
 ## One table for all kinds
@@ -455,7 +455,8 @@ depth, {near} mm at the nearest point; the distance grows with the square of the
 
 `diameter` holds everywhere but where `[[hole.section]]` says otherwise: sections follow each other from the top,
 each to its measured depth `to`, with `diameter`, `friction_static`, `friction_dynamic`; below the last one
-they are those of the scene. `caliper` is a log (file with measured depth and diameter, or rows in m) that replaces them where it reaches;
+they are those of the scene. `caliper` is a log (file with measured depth and diameter, or rows in m) that replaces
+them where it reaches;
 `contact.friction_profile` (file with measured depth, `friction_static` and, if it differs, `friction_dynamic`; or
 rows) is friction as a field of depth. A step of the radius would be a wall across the hole: the radius is the
 greatest profile below the given one that changes by no more than {steepest} per metre. Nothing is wider than

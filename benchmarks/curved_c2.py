@@ -240,9 +240,9 @@ def rolling(result: Result) -> str:
     whirls = np.sqrt(max(0.0, k * sunk / (section.mass_per_length * radius)))
     rolls = (scene.top_drive.speed or 0.0) * section.contact_radius / radius
     return (
-        f"The pipe (600 to 950 m) goes round {1e3 * radius:.1f} mm from the axis of the hole, {1e3 * sunk:.1f} mm in the wall: "
-        f"the wall's force bends its path at {whirls:.2f} rad/s, and a string that rolls there without slip goes round "
-        f"backwards at {rolls:.2f} rad/s."
+        f"The pipe (600 to 950 m) goes round {1e3 * radius:.1f} mm from the axis of the hole, {1e3 * sunk:.1f} mm in "
+        f"the wall:\nthe wall's force bends its path at {whirls:.2f} rad/s, and a string that rolls there without slip "
+        f"goes round\nbackwards at {rolls:.2f} rad/s."
     )
 
 
@@ -264,20 +264,27 @@ def main() -> None:
     begin = float(scene.borehole.nearest(picture(result.fields, 0.0)["position"][-1:])[0]) if scene.borehole else 0.0
     nominal = 1e4 * scene.nominal().rate_of_penetration
     power = means(h, "top_power", 100.0)[1] / 1e3
+    steps, balance = result.summary["steps"], result.summary["energy_balance_error"]
+    sagitta = DRILLED - (DEEPEST - begin)
+    compared = [
+        ["hole drilled in 10 000 s, m", f"{DRILLED}", f"{drilled:.3f}"],
+        ["greatest r_z, m", f"{DEEPEST}", f"{deepest:.3f}"],
+        ["hole less depth gained, m", f"{sagitta:.3f}", f"{drilled - (deepest - begin):.3f}"],
+        [
+            f"hole drilled over nominal, {nominal:.3f} m",
+            f"{100 * (DRILLED / nominal - 1):+.2f} %",
+            f"{100 * (drilled / nominal - 1):+.2f} %",
+        ],
+        ["power of the top drive at the start, kW", "93.9 (T_0 Omega_0)", f"{power[0]:.1f}"],
+        ["and at the end, kW", "in a figure", f"{power[-1]:.1f}"],
+    ]
     text = f"""# Chapter 6, C2: drilling into a curve
 
 Written by `benchmarks/curved_c2.py`. Scene `curved-c2`, rod in space, compiled engine: 64 cubic elements, steps of
-{1e3 * scene.time.step:g} ms, {result.summary["steps"]} steps, energy balance error {result.summary["energy_balance_error"]:.0e}. Statement by statement: `drillfem
-reproduce 6-C2` ([reproduction](reproduction.md)).
+{1e3 * scene.time.step:g} ms, {steps} steps, energy balance error {balance:.0e}. Statement by statement:
+`drillfem reproduce 6-C2` ([reproduction](reproduction.md)).
 
-| | published | ours |
-| --- | ---: | ---: |
-| hole drilled in 10 000 s, m | {DRILLED} | {drilled:.3f} |
-| greatest r_z, m | {DEEPEST} | {deepest:.3f} |
-| hole less depth gained, m | {DRILLED - (DEEPEST - begin):.3f} | {drilled - (deepest - begin):.3f} |
-| hole drilled over nominal, {nominal:.3f} m | {100 * (DRILLED / nominal - 1):+.2f} % | {100 * (drilled / nominal - 1):+.2f} % |
-| power of the top drive at the start, kW | 93.9 (T_0 Omega_0) | {power[0]:.1f} |
-| and at the end, kW | in a figure | {power[-1]:.1f} |
+{table(["", "published", "ours"], compared)}
 
 ![the string in the hole](img/curved-c2-shape.png)
 
@@ -293,16 +300,17 @@ Means over the last 100 s:
 
 The thesis prints neither the curve nor the hole, nor what replaces r_x = r_y = 0 at the bit.
 
-- Curve: hole drilled less depth gained is {DRILLED - (DEEPEST - begin):.2f} m if the start is the bit's, {begin:.2f} m; s^3/(6 R^2) of an arc from
-  there says R = {np.sqrt(DRILLED**3 / 6 / (DRILLED - (DEEPEST - begin))):.0f} m. 573 m is 3 deg per 30 m. The hole cannot be counted from 1200 m, where the unstretched
-  string ends: the bit would then be at 1280.468 m of hole, above its own r_z.
-- Why print drills 1.03 % more than the nominal rate is not explained, and what ours does about it is: in a curve the
-  string's weight is that of its depth, not of its length, so that the weight on bit falls by 0.3 kN in 80 m, and the rate of
-  penetration by 1 %. Friction takes nothing: it points along the slip, and the string turns 115 times as fast as it moves
-  down. Curve, hole, stiffness of the wall, friction and mesh move the depth by a few tenths of a per cent at most (`reproduce
-  6-C2-stages`), g = 9.81 with the printed hook load by +0.8 %.
-- 5 mm of element-wise detail: elements are 18 m long and a string leaves this wall over 5 to 7 m, so the bending
-  moment at the ends of the contact is that of the mesh, as in the thesis.
+- Curve: hole drilled less depth gained is {sagitta:.2f} m if the start is the bit's, {begin:.2f} m;
+  s^3/(6 R^2) of an arc from there says R = {np.sqrt(DRILLED**3 / 6 / sagitta):.0f} m. 573 m is 3 deg per 30 m. The
+  hole cannot be counted from 1200 m, where the unstretched string ends: the bit would then be at 1280.468 m of hole,
+  above its own r_z.
+- Why print drills {100 * (DRILLED / nominal - 1):.2f} % more than the nominal rate is not explained. Ours loses a
+  little: in a curve the string's weight is that of its depth, not of its length, so that the weight on bit falls by
+  0.3 kN in 80 m. Friction takes nothing: it points along the slip, and the string turns 115 times as fast as it moves
+  down. Curve, hole, stiffness of the wall, friction and mesh move the depth by a few tenths of a per cent at most
+  (`reproduce 6-C2-stages`), g = 9.81 with the printed hook load by +0.8 %.
+- Elements are 18 m long and a string leaves this wall over 5 to 7 m, so that the bending moment at the ends of the
+  contact is that of the mesh, as in the thesis.
 - k_s = 1e4 N/m² is soft: the collars sink {1e3 * float(h["penetration"][-1]):.0f} mm behind a clearance of 31.8 mm.
 
 ## Without a fluid the string whirls
@@ -312,16 +320,19 @@ The thesis prints neither the curve nor the hole, nor what replaces r_x = r_y = 
 {whirl_table(found)}
 
 The thesis has no fluid, and says that lateral vibrations "damp fast enough". In its equations nothing damps them: the
-only damping, of the material, turns with the string, and feeds motions across that are slower than its turning (a rotor above its
-critical speed). The weight on bit of 68.55 kN buckles the collars besides: 28 kN do, if the bit can tilt. The collars touch
-the wall, friction drives them round backwards, and in less than two minutes the string rolls along the wall from bottom to top.
-{rolling(found["none"])} Rolling, friction does no work, so nothing ends it; along the string it carries half of the
-weight on bit, and less is left than the wear flats need: nothing is drilled. This is what the model says with steps of 5 ms,
-64 or 128 elements, trapezoidal rule or generalised-alpha, and a wall of 1e4 to 1e6 N/m²; the thesis' backward differences, of
-steps that it does not print, must have damped it. Without friction the string whirls forwards, slowly growing, and drills at the nominal rate.
+only damping, of the material, turns with the string, and feeds motions across that are slower than its turning (a rotor
+above its critical speed). The weight on bit of 68.55 kN buckles the collars besides: 28 kN do, if the bit can tilt. The
+collars touch the wall, friction drives them round backwards, and in less than two minutes the string rolls along the
+wall from bottom to top.
+{rolling(found["none"])}
+Rolling, friction does no work, so nothing ends it; along the string it carries half of the weight on bit, and less is
+left than the wear flats need: nothing is drilled. This is what the model says with steps of 5 ms, 64 or 128 elements,
+trapezoidal rule or generalised-alpha, and a wall of 1e4 to 1e6 N/m²; the thesis' backward differences, of steps that it
+does not print, must have damped it. Without friction the string whirls forwards, slowly growing, and drills at the
+nominal rate.
 
-The scene has a mud of 50 mPa s, for its lateral drag alone (its turning costs the drive 80 N m, 1.2 %). With it the string lies still
-in the hole, as the thesis describes.
+The scene has a mud of 50 mPa s, for its lateral drag alone (its turning costs the drive 80 N m, 1.2 %). With it the
+string lies still in the hole, as the thesis describes.
 """
     (DOCS / "curved-c2.md").write_text(text, encoding="utf-8")
     print(text)

@@ -1,7 +1,8 @@
 """The failure atlas: small experiments in which methods fail, each beside theory and beside the guard that warns.
 
-Writes docs/failure-atlas.md and docs/img/failure-*.png; takes about two minutes of one core. The experiments are those
-of tests/stability, which holds the numbers.
+Writes docs/failure-atlas.md and docs/img/failure-*.png; takes about five minutes of one core. The experiments are those
+of tests/stability, which holds the numbers. Name entries (functions of this file and of contact_atlas.py) to compute
+only those: the rest of the page stays as it is.
 """
 
 from __future__ import annotations
@@ -9,14 +10,13 @@ from __future__ import annotations
 import math
 import sys
 import tempfile
-import textwrap
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import DOCS, table
+from atlas import COLOURS, RPM, Entry, number, picture, run
+from common import DOCS
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
@@ -42,65 +42,8 @@ from drillfem.solve.guards import (
 )
 from drillfem.solve.run import simulate
 
-RPM = math.pi / 30
-COLOURS = (style.INK, style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.PURPLE)
 EULER = {"integrator": "theta", "theta": 1.0}
 UNDAMPED = {"material.retardation_time": 0.0, "time.engine": "petsc"}
-
-
-def wrapped(text: str) -> str:
-    """A paragraph of the page."""
-    return textwrap.fill(text, 120, break_long_words=False, break_on_hyphens=False)
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One failure: what the page says about it. ``rows``: (quantity, measured, theory)."""
-
-    title: str
-    picture: str
-    what: str
-    rows: Sequence[tuple[str, str, str]]
-    does: str
-    says: Sequence[str]
-    command: str
-
-    def text(self) -> str:
-        """The entry in Markdown."""
-        said = "\n".join(f"> {line}" for line in self.says)
-        quote = f"\n\n{said}" if said else ""
-        return "\n\n".join(
-            [
-                f"## {self.title}",
-                wrapped(self.what),
-                f"![{self.title}](img/failure-{self.picture}.png)",
-                table(["", "measured", "theory"], self.rows),
-                wrapped(f"**What drillfem does.** {self.does}") + quote,
-                f"```\n{self.command}\n```",
-            ]
-        )
-
-
-def picture(name: str, title: str, subtitle: str, panels: int, draw: Callable[[Sequence[Any]], None]) -> None:
-    """A page with ``panels`` axes side by side, drawn by ``draw``, saved as failure-<name>.png."""
-    with style.page(1000, 460) as figure:
-        style.heading(figure, title, subtitle)
-        grid = figure.add_gridspec(
-            1, panels, left=0.085, right=0.97, bottom=0.14, top=0.8 if panels == 1 else 0.75, wspace=0.26
-        )
-        draw([figure.add_subplot(grid[0, i]) for i in range(panels)])
-        style.save(figure, DOCS / "img" / f"failure-{name}.png")
-
-
-def run(name: str, *keys: str, until: str = "") -> str:
-    """The command that shows a failure."""
-    sets = "".join(f" \\\n    --set {key}" for key in keys)
-    return f"./run drillfem run {name} --out failure{sets}" + (f" --until {until}" if until else "")
-
-
-def number(value: float, digits: int = 4) -> str:
-    """A number for a table."""
-    return f"{value:.{digits}g}"
 
 
 # -- the entries ------------------------------------------------------------------------------------------------------
@@ -774,22 +717,36 @@ def explicit() -> Entry:
     )
 
 
-def main() -> None:
-    """Write the page and its pictures."""
-    entries = [
-        high_order_bdf(),
-        low_order(),
-        explicit(),
-        surfaces(),
-        steps(),
-        newton(),
-        literal(),
-        quaternions(),
-        locking(),
-        rotation(),
-    ]
-    page = HEADER + "\n\n".join(entry.text() for entry in entries) + "\n"
-    (DOCS / "failure-atlas.md").write_text(page, encoding="utf-8")
+def sections(page: str) -> dict[str, str]:
+    """Entries of a page by title."""
+    return {part.split("\n", 1)[0]: "## " + part.strip() for part in page.split("\n## ")[1:]}
+
+
+def main(names: Sequence[str] = ()) -> None:
+    """Write the page and its pictures; only these entries, if any are named."""
+    import contact_atlas
+
+    own: tuple[Callable[[], Entry], ...] = (
+        high_order_bdf,
+        low_order,
+        explicit,
+        surfaces,
+        steps,
+        newton,
+        literal,
+        quaternions,
+        locking,
+        rotation,
+    )
+    makers = {make.__name__: make for make in (*own, *contact_atlas.ENTRIES)}
+    if unknown := set(names) - set(makers):
+        raise SystemExit(f"{', '.join(sorted(unknown))}: must be of {', '.join(makers)}")
+    path = DOCS / "failure-atlas.md"
+    page = sections(path.read_text(encoding="utf-8")) if names else {}
+    for name in names or makers:
+        entry = makers[name]()
+        page[entry.title] = entry.text()
+    path.write_text(HEADER + "\n\n".join(page.values()) + "\n", encoding="utf-8")
 
 
 HEADER = """# Where methods fail
@@ -802,4 +759,4 @@ that no method changes silently.
 """
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

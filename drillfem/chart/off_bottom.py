@@ -74,7 +74,7 @@ QUICK = Effort(
     dear_steps=(1e-2,),
     stiffness=(1e5, 1e6),
     meshes=(50, 100),
-    laid=(50, 100, 200),
+    laid=(100, 200, 400),
     repeat=1,
     quick=True,
 )
