@@ -12,8 +12,8 @@ demo: ## the main job: a 1200 m string drills rock; history, pictures and a tabl
 demo-well: ## a string starts to turn in a real, horizontal well; pictures, a film, torque and drag in $(OUT)/demo-well
 	$(RUN) drillfem demo well --out $(OUT)/demo-well
 
-test: ## the fast tests; ARGS="-k bit -x" goes to pytest
-	$(RUN) pytest $(ARGS)
+test: ## the fast tests, on two cores; ARGS="-k bit -x" goes to pytest
+	$(RUN) pytest -n 2 --dist loadfile $(ARGS)
 
 lint:
 	$(RUN) ruff check
