@@ -56,7 +56,10 @@ def picture(name: str, title: str, subtitle: str, panels: int, draw: Callable[[S
         grid = figure.add_gridspec(
             1, panels, left=0.085, right=0.97, bottom=0.14, top=0.8 if panels == 1 else 0.75, wspace=0.26
         )
-        draw([figure.add_subplot(grid[0, i]) for i in range(panels)])
+        axes = [figure.add_subplot(grid[0, i]) for i in range(panels)]
+        draw(axes)
+        for each in axes if panels > 1 else ():  # titles side by side
+            each.set_title(each.get_title(loc="left"), loc="left", fontsize=9)
         style.save(figure, DOCS / "img" / f"failure-{name}.png")
 
 

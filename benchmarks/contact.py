@@ -1,6 +1,6 @@
 """Contact and friction: methods beside each other at rest and in time, step limits, the closest point, friction.
 
-Writes docs/contact.md and its pictures in a few minutes of one core.
+Writes docs/contact.md and its pictures in about ten minutes of one core.
 """
 
 from __future__ import annotations
@@ -129,6 +129,27 @@ def at_rest() -> tuple[str, list[Laid]]:
         text for n in (100, 200) for text in (f"error, {n} elements", "penetration (mm)", "CPU (s)")
     ]
     return table(header, rows), kept
+
+
+def inclined() -> str:
+    """Side force of a string that lies straight in an inclined hole, away from its ends, over w sin i."""
+    rows = []
+    for degrees in (15, 30, 60, 90):
+        row = [f"{degrees}"]
+        for method in ("penalty", "smooth", "augmented"):
+            hole = {"kind": "straight", "inclination": math.radians(degrees), "diameter": 0.2}
+            case = scene(200.0, 80, hole, contact={"method": method})
+            rod = Rod(case)
+            wall, contact = rod.wall, case.contact
+            assert wall is not None and contact is not None
+            u = lay(rod)
+            rod.set_state(u, np.zeros_like(u))
+            middle = (wall.arc_length > 50) & (wall.arc_length < 150)
+            w = case.string[0].mass_per_length * case.gravity.magnitude
+            error = wall.side_force(u, contact)[middle] / (w * math.sin(math.radians(degrees))) - 1
+            row.append(f"{100 * float(np.abs(error).max()):.2g} %")
+        rows.append(row)
+    return table(["inclination (deg)", "`penalty`", "`smooth`", "`augmented`"], rows)
 
 
 @contextmanager
@@ -455,6 +476,31 @@ def draw_friction() -> str:
     return f"{100 * error:.2g} %"
 
 
+def rough() -> str:
+    """Torque per metre of a string that turns in a hole with a profile of friction, over that of each stretch."""
+    profile = [(0.0, 0.15), (60.0, 0.15), (60.001, 0.3), (140.0, 0.3), (200.0, 0.45)]
+    case = scene(
+        200.0,
+        80,
+        {"kind": "straight", "inclination": 1.0, "diameter": 0.2},
+        contact={"friction_profile": [[p, mu, mu] for p, mu in profile]},
+    )
+    rod = Rod(case)
+    Sliding(rod).operate(lay(rod), Operation("", "", spin=1.0))
+    f = rod.fields()
+    w = case.string[0].mass_per_length * case.gravity.magnitude * math.sin(1.0)
+    rows = []
+    for a, b in ((25.0, 50.0), (75.0, 125.0), (150.0, 175.0)):
+        i, j = np.searchsorted(f["arc_length"], [a, b])
+        s = np.linspace(f["arc_length"][i], f["arc_length"][j], 2001)
+        mu = np.interp(s, *np.array(profile).T)
+        exact = float(np.trapezoid(mu * w / np.hypot(1, mu), s)) * case.string[0].contact_radius
+        found = float(f["torque"][i] - f["torque"][j])
+        text = f"{mu[0]:.3g}" if np.ptp(mu) < 1e-9 else f"{mu[0]:.3g} to {mu[-1]:.3g}"
+        rows.append([f"{s[0]:g} to {s[-1]:g}", text, f"{abs(found):.2f}", f"{exact:.2f}"])
+    return table(["measured depth (m)", "μ", "torque taken (N m)", "∫ μ r w sin i/√(1 + μ²)"], rows)
+
+
 def capstan() -> str:
     rows = []
     for mu in (0.1, 0.3):
@@ -552,6 +598,7 @@ def main() -> None:
     torque, soft, climbing = break_off()
     values = {
         "rest": rest,
+        "inclined": inclined(),
         "rules": rules(),
         "bounce": bouncing(),
         "multipliers": multipliers(),
@@ -559,6 +606,7 @@ def main() -> None:
         "points": points,
         "order": order,
         "freed": draw_friction(),
+        "rough": rough(),
         "capstan": capstan(),
         "torque": torque,
         "soft": soft,
@@ -585,7 +633,10 @@ def main() -> None:
 
 TEXT = """# Contact and friction
 
-Written by `benchmarks/contact.py`.
+Written by `benchmarks/contact.py`, every number and picture of it: ten minutes of one core. `tests/forms/test_wall.py`
+and `tests/physics/test_contact.py`, `test_friction.py` and `test_wall_energy.py` hold what it claims. Where the methods
+fail, and what is said then: [where methods fail](failure-atlas.md). What they cost for an accuracy:
+[accuracy and speed](accuracy-and-speed.md), or `drillfem chart off-bottom`.
 
 ## What the wall does
 
@@ -607,6 +658,11 @@ hole) and bends; tests hold them to differences on the true hole, force by force
 and is 0 for `penalty` and `smooth` unless given; `augmented` takes one time step at least.
 
 ## At rest
+
+A string that lies straight in an inclined hole presses on it with w sin i. 200 m of pipe, 80 elements, the middle
+100 m; the largest error at any point:
+
+{inclined}
 
 Well A (2500 m, build to 60 deg on 573 m), laid in its hole. Error: of the side force against |w sin i − Fκ| in bend
 and tangent, relative to the weight per length, the largest at any point that is 60 m from a kink of the curvature
@@ -692,6 +748,11 @@ Dots are the rod (steady sliding, `drillfem torque-drag`), lines closed forms; t
 string that turns climbs the wall until weight and friction balance: N = w sin i/√(1 + μ²), so that the torque is
 less by as much than the μ r w sin i of the books. The break-off torque of well A with μ = 0.3 is {torque} N m; the
 soft string's side forces give {soft}, with the factor {climbing}.
+
+The coefficient may be one number, one per `[[hole.section]]`, or a field of measured depth (`friction_profile`).
+A string that turns in a straight hole, 1 rad inclined, on a profile that steps at 60 m and rises from 140 m on:
+
+{rough}
 
 A limp rope pulled through an arc of 1.2 rad, tension over exp(μθ):
 

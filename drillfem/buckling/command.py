@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich import box
@@ -19,8 +19,7 @@ from ..render import style
 from ..results.atomic import write_json
 from ..results.manifest import check_new_folder
 from ..solve.laid import lay
-from ..solve.wall_guards import unseen_buckling
-from ..torque_drag.command import load_of
+from ..torque_drag.command import coarse, load_of
 from ..torque_drag.limits import Limits, limits
 from .column import Column
 from .drawing import MAP
@@ -80,13 +79,6 @@ def run(
     return found, limit
 
 
-def coarse(scene: Scene, line: Line, weight: float) -> list[str]:
-    """What the guard of a run would say of the mesh of a string that carries a weight on bit (N)."""
-    tangent = line.hole.frame(line.length).tangent[0]
-    ends = replace(scene.ends, tip_force=tuple(float(x) for x in -weight * tangent))
-    return list(unseen_buckling(replace(scene, bit=None, ends=ends)))
-
-
 def _row(line: Line, limit: Limits, step: Step, laid: Step) -> dict[str, float]:
     """What the table says of a step."""
     share = compression(line, step) / limit.sinusoidal
@@ -132,7 +124,7 @@ def draw(title: str, line: Line, limit: Limits, found: list[Step], path: Path) -
         push, angle, bend = (figure.add_axes((0.06 + 0.3 * i, 0.08, 0.255, 0.76)) for i in range(3))
         shade = colors.Normalize(0.0, found[-1].load / 1e3)
         for step in found:
-            look = {"color": colormaps[MAP](shade(step.load / 1e3)), "lw": 1.3}
+            look: dict[str, Any] = {"color": colormaps[MAP](shade(step.load / 1e3)), "lw": 1.3}
             push.plot(compression(line, step) / 1e3, step.arc_length, **look)
             angle.plot(step.angle / (2 * np.pi), step.arc_length, **look)
             bend.plot(step.bending_moment / 1e3, step.arc_length, **look)

@@ -14,7 +14,7 @@ from .column import Column
 
 @dataclass(frozen=True)
 class Step:
-    """A stable equilibrium under a load (N). Arrays are over the nodes from the top down, ``side`` over contact points."""
+    """A stable equilibrium under a load (N); arrays over the nodes from the top down, ``side`` over contact points."""
 
     load: float
     x: Array  # the state, flat

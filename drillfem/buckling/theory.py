@@ -108,8 +108,11 @@ class Wave(NamedTuple):
 _POINTS = 2 * np.pi * np.arange(96) / 96
 
 
-def _least(beta: float, orders: F8, turn: float, start: F8) -> tuple[F8, F8, float]:
-    """Wave number and coefficients, angle (96,) and energy of theta = turn x + sum c_k sin(k x), x = q s."""
+def _least(beta: float, orders: F8, turn: float, start: F8, held: bool = False) -> tuple[F8, F8, float]:
+    """Wave number and coefficients, angle (96,) and energy of theta = turn x + sum c_k sin(k x), x = q s.
+
+    held: the wave number is that of the start.
+    """
     sin, cos = np.sin(np.outer(_POINTS, orders)), np.cos(np.outer(_POINTS, orders))
 
     def parts(c: F8) -> tuple[F8, F8, F8]:
@@ -120,17 +123,24 @@ def _least(beta: float, orders: F8, turn: float, start: F8) -> tuple[F8, F8, flo
         angle, slope, bend = parts(c)
         return float(np.mean(bend**2 / 2 + slope**4 / 2 - beta * slope**2 + 1 - np.cos(angle)))
 
-    found = minimize(energy, start, tol=1e-13)
-    return found.x, parts(found.x)[0], float(found.fun)
+    if held:
+        c = minimize(lambda c: energy(np.concatenate([start[:1], c])), start[1:], tol=1e-13).x
+        at = np.concatenate([start[:1], c])
+    else:
+        at = minimize(energy, start, tol=1e-13).x
+    return at, parts(at)[0], energy(at)
 
 
-def snake(betas: F8) -> list[Wave]:
-    """Snaking strings at ascending loads beta > 1, each found from the last one."""
+def snake(betas: F8, wave_number: float | None = None) -> list[Wave]:
+    """Snaking strings at ascending loads beta > 1, each found from the last one.
+
+    wave_number (in kappa): of a string whose ends let it have no other; else that of the least energy.
+    """
     # just beyond the onset the amplitude is that of -(beta - 1) A^2/2 + 11 A^4/64
     start = math.sqrt(16 / 11 * (betas[0] - 1))
-    orders, at, out = np.array([1.0, 3.0, 5.0, 7.0]), np.array([1.0, start, 0.0, 0.0, 0.0]), []
+    orders, at, out = np.array([1.0, 3.0, 5.0, 7.0]), np.array([wave_number or 1.0, start, 0.0, 0.0, 0.0]), []
     for beta in betas:
-        at, angle, energy = _least(float(beta), orders, 0.0, at)
+        at, angle, energy = _least(float(beta), orders, 0.0, at, wave_number is not None)
         out.append(Wave(float(beta), energy, float(at[0]), float(np.abs(angle).max())))
     return out
 
@@ -148,6 +158,6 @@ def helix(betas: F8) -> list[Wave]:
 def equal_energy() -> float:
     """Load beta at which a snaking string and a helix have the same energy: 2 beta = 2.90 stands where 2.83 does
     against the straight string."""
-    at = np.linspace(1.4, 1.5, 6)
+    at: F8 = np.linspace(1.4, 1.5, 6, dtype=np.float64)
     gain = np.array([a.energy - b.energy for a, b in zip(snake(at), helix(at[::-1])[::-1], strict=True)])
     return float(brentq(lambda beta: float(np.interp(beta, at, gain)), at[0], at[-1]))

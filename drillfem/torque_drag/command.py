@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from ..models.soft_string import Line, line_of
 from ..results.atomic import replacing, write_json
 from ..results.manifest import check_new_folder
 from ..scene.units import to_si
+from ..solve.wall_guards import unseen_buckling
 from .limits import limits
 from .operation import F8, OPERATIONS, Operation, Profile, deepest, operations_of
 from .report import Broomstick, Study, buckling_text, dataset, draw, print_table, write_csv
@@ -82,10 +84,18 @@ def study(
     return Study(scene.title, line, profiles, found, sticks, notes)
 
 
+def coarse(scene: Scene, line: Line, weight: float) -> list[str]:
+    """What the guard of a run would say of the mesh of a string that carries a weight on bit (N)."""
+    tangent = line.hole.frame(line.length).tangent[0]
+    ends = replace(scene.ends, tip_force=tuple(float(x) for x in -weight * tangent))
+    return list(unseen_buckling(replace(scene, model="spatial", bit=None, ends=ends)))
+
+
 def _stiff(scene: Scene, wanted: list[Operation], friction: str, notes: list[str]) -> list[Profile]:
     """The rod's profiles; where it finds no equilibrium, one of nan and a note."""
     from .stiff import sliding_string  # DOLFINx and PETSc
 
+    notes += [f"stiff string: {text}" for text in coarse(scene, line_of(scene), max(o.weight_on_bit for o in wanted))]
     sliding, laid = sliding_string(scene, friction)
     found: list[Profile] = []
     for operation in wanted:

@@ -222,8 +222,8 @@ def draw(study: Study, path: Path) -> Path:
         pull.axvline(0.0, color=style.GREY, lw=0.9)
         if not turning:
             twist.text(0.5, 0.5, "nothing turns", transform=twist.transAxes, ha="center", color=style.GREY)
-        for axes in (twist, side):
-            axes.set_xlim(left=0.0)
+        twist.set_xlim(left=0.0)
+        _side_range(side, [p for ps in study.profiles.values() for p in ps if not np.isnan(p.hook_load)])
         if study.broomsticks:
             _range(hook, [b.hook_load for b in study.broomsticks])
             hook.axvline(0.0, color=style.GREY, lw=0.9)
@@ -243,6 +243,23 @@ def draw(study: Study, path: Path) -> Path:
             handles=handles, loc="upper left", bbox_to_anchor=(0.043, 0.905), ncols=len(handles), columnspacing=1.8
         )
         return style.save(figure, path)
+
+
+def _side_range(axes: Axes, profiles: Sequence[Profile]) -> None:
+    """Range of the side force; the few metres where a rod bears on its stabilisers do not set it."""
+    axes.set_xlim(left=0.0)
+    ranges = [float(np.quantile(p.side_force, 0.98 if p.method == "stiff" else 1.0)) for p in profiles]
+    largest = max((float(p.side_force.max()) for p in profiles), default=0.0)
+    if profiles and 0 < 2 * max(ranges) < largest:
+        axes.set_xlim(right=1.1e-3 * max(ranges))
+        axes.annotate(
+            f"up to {largest / 1e3:.1f}",
+            (0.97, 0.06),
+            xycoords="axes fraction",
+            ha="right",
+            color=style.GREY,
+            fontsize=9,
+        )
 
 
 def _hole(axes: Axes, line: Line) -> None:

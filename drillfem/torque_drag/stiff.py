@@ -103,11 +103,13 @@ class Sliding(Statics):
                 x = self.solve(self._twisted(x, operation, share - done), np.array([share]), load, least=1.0).x.reshape(
                     -1
                 )
-            except SimulationError as error:
+            except SimulationError:
                 step /= 2
                 if step < _STEPS[1]:
                     raise SimulationError(
-                        f"{operation.title}: no equilibrium beyond {100 * done:.3g} % of loads and friction ({error})"
+                        f"{operation.title}: no equilibrium found beyond {100 * done:.3g} % of loads and friction: "
+                        "where the string buckles, drillfem buckling follows it (without friction); else try more "
+                        "mesh.elements"
                     ) from None
                 continue
             done, step = share, 1.5 * step

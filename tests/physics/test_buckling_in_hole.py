@@ -23,11 +23,11 @@ from drillfem.buckling import (
     snake,
     wound,
 )
-from drillfem.buckling.command import coarse
 from drillfem.cli import main
 from drillfem.models.rod import Rod
 from drillfem.models.soft_string import line_of
 from drillfem.scene import load_scene
+from drillfem.torque_drag.command import coarse
 
 LEVEL = math.pi / 2
 
@@ -64,6 +64,8 @@ def test_shapes_on_the_wall() -> None:
     for wave in snakes[:2]:
         assert wave.amplitude**2 == pytest.approx(16 / 11 * (wave.beta - 1), rel=0.02)
         assert wave.energy == pytest.approx(-4 / 11 * (wave.beta - 1) ** 2, rel=0.03)
+    assert snake(np.array([1.3]), 1.0)[0].amplitude < 0.98 * snakes[2].amplitude
+    assert snake(np.array([1.3]), 1.0)[0].energy > snakes[2].energy
     # an even helix: e = 1 - beta^2/2, q^2 = beta
     for wave in coils:
         assert wave.energy == pytest.approx(1 - wave.beta**2 / 2, abs=0.01)
@@ -153,8 +155,9 @@ def test_snake_swings_as_the_least_energy_says() -> None:
     steps = list(follow(column, column.lying(), np.array([0.97, 1.05, 1.2]) * pipe.snaking))
     assert steps[0].turns < 1e-9 and steps[0].softest > 0
     for step in steps[1:]:
-        (theory,) = snake(np.array([step.load / pipe.snaking]))
-        assert step.swing(1.2 * pipe.wave) == pytest.approx(theory.amplitude, rel=0.02)
+        # as many waves as it is long: its ends let it have no other number
+        (theory,) = snake(np.array([step.load / pipe.snaking]), 1.0)
+        assert step.swing(1.2 * pipe.wave) == pytest.approx(theory.amplitude, rel=5e-3)
         assert step.turns < 0.5 and step.softest > 0
         assert step.side[:, 1].max() > 1.2 * pipe.across
     # and back: no memory

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,13 @@ import numpy as np
 import pytest
 
 from drillfem.cli import main
-from drillfem.errors import SceneError
+from drillfem.errors import SceneError, SimulationError
 from drillfem.models.rod import Rod
 from drillfem.models.soft_string import line_of
 from drillfem.scene import Scene, load_scene
 from drillfem.solve.laid import lay
 from drillfem.torque_drag import OPERATIONS, Operation, soft_string
+from drillfem.torque_drag.command import study
 from drillfem.torque_drag.operation import operations_of
 from drillfem.torque_drag.stiff import Sliding, stiff_string
 
@@ -160,6 +162,35 @@ def test_command_puts_it_beside_the_soft_string(tmp_path: Path, capsys: pytest.C
     assert (soft["method"], stiff["method"]) == ("soft", "stiff")
     assert stiff["hook_load"] == pytest.approx(soft["hook_load"], rel=2e-3)
     assert "stiff" in capsys.readouterr().out
+
+
+def test_says_that_the_mesh_cannot_see_buckling() -> None:
+    """A level string pushed beyond its snaking load (370 kN), on elements of 20 m and on ones of 4 m."""
+    hole = {"kind": "straight", "inclination": math.pi / 2}
+    for elements, blind in ((3, True), (15, False)):
+        case = scene(60.0, hole, 26.83, 1.279e6, elements=elements)
+        for weight in (3e5, 5e5):
+            notes = study(case, ["sliding"], ["stiff"], weight).notes
+            assert any("cannot see the string buckle" in note for note in notes) == (blind and weight > 4e5)
+
+
+def test_says_how_far_it_got(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: Any) -> None:
+    solve = Sliding.solve
+
+    def gives_up(self: Sliding, x: np.ndarray, at: np.ndarray, *arguments: Any, **more: Any) -> Any:
+        if at[-1] > 0.7 and self.speed.value < 0:
+            raise SimulationError("no")
+        return solve(self, x, at, *arguments, **more)
+
+    monkeypatch.setattr(Sliding, "solve", gives_up)
+    arguments = ["torque-drag", "off-bottom", "--out", str(tmp_path / "td"), "--method", "stiff"]
+    trips = ["--operation", "tripping-out", "--operation", "tripping-in"]
+    assert main([*arguments, *trips, "--set", "mesh.elements=40"]) == 0
+    out, into = json.loads((tmp_path / "td" / "torque-drag.json").read_text())["operations"]
+    assert out["hook_load"] is None and into["hook_load"] > 7e5
+    printed = capsys.readouterr().out
+    share = re.search(r"stiff string, tripping out: no equilibrium found beyond (\S+) % of loads", printed)
+    assert share and 69 < float(share[1]) <= 70
 
 
 def test_needs_a_hole() -> None:
