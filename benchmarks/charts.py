@@ -70,8 +70,8 @@ PROSE = {
     ),
     ("off-bottom", "steps"): (
         "The whole rod on its wall. The compiled engine and PETSc take the same steps by the same forms: engine and "
-        "Newton strategy differ in cost and not in error. Methods of the second order are of the first here, for the "
-        "motion is not smooth in time: fronts of waves run down, and points touch, leave and come to slide."
+        "Newton strategy differ in cost and not in error. Methods of the second order are of the first here, probably "
+        "because the motion is not smooth in time: fronts of waves run down, and points touch, leave and slide."
     ),
     ("off-bottom", "contact"): (
         "One string, one step, and walls from soft to stiff, against a wall that lets nothing in. The error of a "

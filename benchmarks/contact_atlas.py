@@ -685,8 +685,8 @@ def fed_sections() -> Entry:
         "vibrate at a few hundred hertz. A string without damping that carries a torque which varies along it feeds "
         "them: the interpolated virtual rotations are not conservative on them. On 25 m elements a start-up breaks "
         "down within a second, and shorter steps make it worse, because long ones do not resolve what grows. What is "
-        "left with full integration is the same on every mesh and in proportion to the torque: a torque of fixed "
-        "direction on a free end is not conservative (Ziegler's shaft), whatever the elements are.",
+        "left with full integration is the same on every mesh and in proportion to the torque; where it comes from is "
+        "open.",
         rows,
         "Estimates the growth from torque, element and damping, asks the scene's integrator whether it survives, and "
         "names the two cures: `mesh.quadrature = 'full'`, which from degree 2 on does not lock, or a retardation time "
