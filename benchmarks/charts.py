@@ -76,8 +76,8 @@ PROSE = {
     ("off-bottom", "contact"): (
         "One string, one step, and walls from soft to stiff, against a wall that lets nothing in. The error of a "
         "penalty goes with its compliance until the wall is stiffer than mesh and step can follow. The closest point "
-        "as an unknown (D-6) gives the same and costs three times as much; an augmented Lagrangian twice, on a soft "
-        "wall many times."
+        "as an unknown (D-6) gives the same and costs three times as much; an augmented Lagrangian one and a half to two "
+        "times, on a soft wall many times."
     ),
     ("off-bottom", "meshes"): (
         "Reduced integration, the default, lets sections turn that torque then feeds: on 50 m elements the run breaks "
