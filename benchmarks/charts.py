@@ -76,7 +76,7 @@ PROSE = {
     ("off-bottom", "contact"): (
         "One string, one step, and walls from soft to stiff, against a wall that lets nothing in. The error of a "
         "penalty goes with its compliance until the wall is stiffer than mesh and step can follow. The closest point "
-        "as an unknown (D-6) gives the same and costs three times as much; an augmented Lagrangian one and a half to two "
+        "as an unknown (D-6) gives the same and costs three times as much; an augmented Lagrangian 1.5 to 2 "
         "times, on a soft wall many times."
     ),
     ("off-bottom", "meshes"): (

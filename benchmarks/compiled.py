@@ -230,6 +230,10 @@ velocities are unit rows, as with PETSc. That the kinematic rows are local is ch
 including its start by two half steps of backward Euler and its way of refusing steps (a quarter of the length, ten
 times at most). What it does not have: adaptive steps, BDF, ARKIMEX.
 
+**Who iterates.** Without rock, in a hole that does not bend, in the plane or along the axis, Newton's method itself
+runs in C: search of the wall, residual, solution, decision about a new factorisation, until a step is solved
+([chapter 7](chapter-7.md) lives on it). It decides as the loop in Python does, on the same numbers.
+
 The library is compiled once per source and processor, into the cache folder of the kernels; the loops keep no state of
 their own, so that any number of engines live in one process.
 

@@ -314,7 +314,7 @@ from drillfem.torque_drag import OPERATIONS, greatest_weight, limits, lock_up_de
 line = line_of(scene)
 found = soft_string(line, OPERATIONS["tripping-out"])
 found.hook_load, found.surface_torque, found.measured_depth, found.tension, found.torque, found.side_force
-soft_string(line.to_depth(1500.0), OPERATIONS["rotating"])      # with the bit at 1500 m
+soft_string(line.to_depth(1500.0), OPERATIONS["rotating"])  # with the bit at 1500 m
 ```
 
 ## Stiff string

@@ -14,6 +14,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from .ansatz import Ansatz
+from .bit import Saturating, push, resisted
 from .constitutive import Section, elastic_resultants, viscous_resultants
 from .drive import Motor, motor
 from .kinematics import E3, Configuration, Twist, strain_rates, strains
@@ -112,7 +113,8 @@ class Lump:
 class Loads:
     """What acts on the rod besides itself; absent parts are None.
 
-    ``centreline``: the hole at the nodes, where its measured depth is an unknown.
+    ``centreline``: the hole at the nodes, where its measured depth is an unknown. ``resistance``, ``push`` (N): rock
+    that saturates, and a force along e3, at the lower end.
     """
 
     g: Expr
@@ -125,6 +127,8 @@ class Loads:
     motor: Motor | None = None
     mud: Mud | None = None
     centreline: Hole | None = None
+    resistance: Saturating | None = None
+    push: Expr | None = None
 
 
 def virtual_work(
@@ -164,6 +168,10 @@ def virtual_work(
         terms["friction"] = friction(x, twist, virtual, radius, loads.wall) * on.wall
     if loads.bit is not None:
         terms["bit"] = bit_load(x, virtual, loads.bit) * on.bottom
+    if loads.resistance is not None:
+        terms["resistance"] = resisted(twist, virtual, loads.resistance) * on.bottom
+    if loads.push is not None:
+        terms["push"] = push(virtual, loads.push) * on.bottom
     if loads.motor is not None:
         terms["motor"] = motor(x, twist, rate, virtual, loads.motor) * on.top
     if loads.mud is not None:

@@ -79,6 +79,8 @@ class Wall(Hole):
     ``stiffness`` k_s (N/m2); ``smoothing`` (m) of the method "smooth"; ``velocity_scale`` n (s/m); ``regularisation``
     eps. ``method``: penalty, smooth or augmented. ``projected``: friction along the wall only (else the literal,
     unprojected velocity). ``retardation`` (s): what presses is the penetration, and this times its rate; None: no rate.
+    ``load`` (3, N/m): the wall presses with what of it points across the hole, always and everywhere, and the string
+    lies still: springs k_s hold it on the centreline, to both sides (chapter 7, case B). None: it acts by penetration.
     """
 
     stiffness: Expr
@@ -88,6 +90,7 @@ class Wall(Hole):
     method: str = "penalty"
     projected: bool = True
     retardation: Expr | None = None
+    load: Expr | None = None
 
 
 def _contact(x: Configuration, radius: Expr, wall: Wall) -> tuple[Expr, Expr]:
@@ -107,6 +110,11 @@ def _closing(x: Configuration, v: Expr, normal: Expr, wall: Wall) -> Expr:
 
 def _pressed(x: Configuration, twist: Twist, radius: Expr, wall: Wall) -> tuple[Expr, Expr]:
     """Outward normal (3) and normal force per length (N/m)."""
+    if wall.load is not None:
+        t = wall.tangent(x.r, x.p)
+        across = wall.load - ufl.dot(wall.load, t) * t
+        size = ufl.sqrt(ufl.dot(across, across) + 1e-24)
+        return across / size, size
     normal, g = _contact(x, radius, wall)
     if wall.retardation is not None:
         g = g + wall.retardation * _closing(x, twist.v, normal, wall)
@@ -131,6 +139,8 @@ def wall_energy(x: Configuration, radius: Expr, wall: Wall) -> Expr:
     """Potential of the normal force, per length (J/m): its derivative along a motion is :func:`contact`."""
     _, g = _contact(x, radius, wall)
     k, width = wall.stiffness, wall.smoothing
+    if wall.load is not None:
+        return k * ufl.dot(wall.offset(x.r, x.p), wall.offset(x.r, x.p)) / 2
     if wall.method == "smooth":
         begins = ufl.conditional(ufl.gt(g, -width), k * (g + width) ** 3 / (12 * width), 0.0)
         return ufl.conditional(ufl.gt(g, width), k * (g**2 / 2 + width**2 / 6), begins)
@@ -153,6 +163,8 @@ def contact(x: Configuration, twist: Twist, virtual: Twist, radius: Expr, wall: 
     Where the hole narrows the force has a part along it: both come from the one potential.
     """
     normal, force = _pressed(x, twist, radius, wall)
+    if wall.load is not None:
+        return ufl.dot(force * normal + wall.stiffness * wall.offset(x.r, x.p), virtual.v)
     return force * _closing(x, virtual.v, normal, wall)
 
 

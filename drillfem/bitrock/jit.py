@@ -11,7 +11,7 @@ import inspect
 import logging
 import os
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -39,6 +39,7 @@ def announce() -> None:
     """Tell the user, through the logger ``drillfem``, when the next calls will compile: once, it takes a while."""
     if any(not any(Path(folder).rglob("*.nbi")) for folder in _folders):
         logging.getLogger("drillfem").info("compiling kernels, once")
+        _folders.clear()  # said of these
 
 
 @cache
@@ -57,17 +58,30 @@ def kernel(*fastmath: str, lean: bool = False) -> Callable[[F], F]:
     options: dict[str, Any] = {"fastmath": set(fastmath) or False} | (_LEAN if lean else {})
 
     def compiled(function: F) -> F:
-        before = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = os.path.join(_BASE, _digest(inspect.getfile(function)))
-        _folders.add(numba.config.CACHE_DIR)
-        try:
-            return numba.njit(cache=True, **options)(function)
-        except RuntimeError:  # no folder can be written: compile in each process
-            return numba.njit(**options)(function)
-        finally:
-            numba.config.CACHE_DIR = before
+        return _on_disk(function, numba.njit, options)
 
     return compiled
+
+
+def callback(signature: str) -> Callable[[Callable[..., None]], Any]:
+    """Decorator: compile for C to call, by the attribute ``address``, and keep on disk. ``signature``: numba's."""
+
+    def compiled(function: Callable[..., None]) -> Any:
+        return _on_disk(function, partial(numba.cfunc, signature), {})
+
+    return compiled
+
+
+def _on_disk(function: Any, compiler: Callable[..., Any], options: dict[str, Any]) -> Any:
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = os.path.join(_BASE, _digest(inspect.getfile(function)))
+    _folders.add(numba.config.CACHE_DIR)
+    try:
+        return compiler(cache=True, **options)(function)
+    except RuntimeError:  # no folder can be written: compile in each process
+        return compiler(**options)(function)
+    finally:
+        numba.config.CACHE_DIR = before
 
 
 @kernel(lean=True)

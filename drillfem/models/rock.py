@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import ufl
 from mpi4py import MPI
@@ -12,6 +14,7 @@ from ..forms import surface as forms
 from ..meshes.periodic import ordered_dofs, sector_mesh
 
 
+@lru_cache(maxsize=16)  # all members of an ensemble have the same
 def advection_operators(degree: int, elements: int, width: float, scheme: str = "dg") -> DGOperators:
     """Operators of a sector of ``width`` (rad), assembled by DOLFINx, degrees of freedom sorted by angle.
 

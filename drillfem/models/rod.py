@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -15,6 +16,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..bitrock.jit import kernel
+from ..boreholes import Borehole
 from ..boreholes.closest import piece
 from ..compat import (
     Array,
@@ -29,6 +31,7 @@ from ..compat import (
 )
 from ..forms import virtual_work as vw
 from ..forms.ansatz import Ansatz, Spatial, ansatz
+from ..forms.bit import Saturating
 from ..forms.constitutive import SECTION, Section, elastic_resultants, viscous_resultants
 from ..forms.kinematics import Twist
 from ..forms.mud import MUD, Mud
@@ -49,6 +52,7 @@ _HELD = {
     "pinned": ("v1", "v2", "v3"),
     "clamped": ("v1", "v2", "v3", "w1", "w2", "w3"),
     "hung": ("v1", "v2", "v3", "w1", "w2"),
+    "sliding": ("v1", "v2", "w1", "w2", "w3"),
     "guided": ("v1", "v2"),
     "bit": ("v1", "v2", "w1", "w2"),
 }
@@ -81,12 +85,34 @@ def section_table(scene: Scene) -> Array:
 
 def section_field(scene: Scene, mesh: StringMesh) -> dolfinx.fem.Function:
     """Piecewise constant field of the section properties, components ordered as SECTION."""
-    V = discontinuous(mesh.mesh, 0, len(SECTION))
-    field = dolfinx.fem.Function(V)
-    table = section_table(scene)
-    values = field.x.array.reshape(-1, len(SECTION))
-    values[V.dofmap.list[mesh.cells.indices, 0]] = table[mesh.cells.values]
+    field = dolfinx.fem.Function(discontinuous(mesh.mesh, 0, len(SECTION)))
+    _fill(field, scene, mesh)
     return field
+
+
+def _fill(field: dolfinx.fem.Function, scene: Scene, mesh: StringMesh) -> None:
+    values = field.x.array.reshape(-1, len(SECTION))
+    cells = field.function_space.dofmap.list[mesh.cells.indices, 0]
+    values[cells] = section_table(scene)[mesh.cells.values]
+
+
+def structure(scene: Scene) -> Hashable:
+    """What the forms, kernels and matrices of a scene's rod depend on: scenes where it is equal differ by numbers only,
+    and :meth:`Rod.take` leads from one to the other. None: no other scene's rod will do."""
+    drive, contact, bit, hole = scene.top_drive, scene.contact, scene.bit, scene.hole
+    if drive.follows or scene.mud is not None or scene.inertia.distributed != 1 or hole.bends:
+        return None
+    wall: Hashable = None
+    if contact is not None:
+        if contact.method == "augmented" or contact.closest_point == "field":
+            return None
+        wall = contact.method, contact.projected, contact.normal_force, contact.retardation_time
+    return (
+        (scene.resolved_model().name, scene.reading, scene.engine, scene.time.analysis, scene.mesh, scene.reference),
+        tuple(s.length for s in scene.string),
+        (hole.kind, wall, scene.motor is None, bit and bit.kind),
+        (scene.ends.top, scene.ends.bottom, scene.hangs, drive.kind, drive.axis, drive.block_speed),
+    )
 
 
 def measures(mesh: StringMesh, degree: int, reduced: bool = True, wall_degree: int = 0) -> vw.Measures:
@@ -116,11 +142,11 @@ def measures(mesh: StringMesh, degree: int, reduced: bool = True, wall_degree: i
 
 
 @kernel(lean=True)
-def _hold(rows: npt.NDArray[np.int32], u: Array, out: Array, reaction: Array) -> None:
-    """Put u (n,) into some rows of out (n,), what stood there into reaction."""
+def _hold(rows: npt.NDArray[np.int32], u: Array, imposed: Array, out: Array, reaction: Array) -> None:
+    """Put u (n,) less what is imposed into some rows of out (n,), what stood there into reaction."""
     for k in range(rows.size):
         reaction[k] = out[rows[k]]
-        out[rows[k]] = u[rows[k]]
+        out[rows[k]] = u[rows[k]] - imposed[k]
 
 
 @kernel()
@@ -174,6 +200,10 @@ class Rod:
         self._last = int(self.nodes[-1])
         self.arc_length: Array = s[self.nodes]
         self.length = float(sum(section.length for section in scene.string))
+        self._loading: list[dolfinx.fem.Constant] = []
+        self._present: Iterator[dolfinx.fem.Constant] | None = None
+        #: what an engine keeps for the next run on this rod
+        self.kept: dict[str, Any] = {}
         self.on = measures(self.string, scene.mesh.degree, scene.mesh.quadrature == "reduced", self.wall_degree)
         self.section = Section(section_field(scene, self.string))
         self.s = ufl.SpatialCoordinate(self.mesh)[0]
@@ -194,6 +224,10 @@ class Rod:
         law = law_of(scene)
         #: the drive, where it is a torque that follows the top
         self.drive = TopTorque(scene, law, self.constant) if law is not None else None
+        #: force of a mud motor at the lower end (N), and the speed that it works on
+        self.push = self.constant(0.0)
+        self._push_value = self.push.value
+        self._advancing = self.dof(-1, "v3") if "v3" in self.ansatz.v_names else None
         self.loads = self._loads()
         self.terms = vw.dynamic_terms(
             self.ansatz,
@@ -216,7 +250,14 @@ class Rod:
         self.driven_spin = self.dof(0, "w3") if "w3" in self.ansatz.v_names else None
         #: raw residual at the constrained dofs: the reactions of the last evaluation
         self.reaction: Array = np.zeros(len(self.constrained))
+        #: speeds that are imposed on them (m/s, rad/s), see :meth:`at`
+        self.imposed: Array = np.zeros(len(self.constrained))
+        self._driven_at = [(int(np.searchsorted(self.constrained, row)), share) for row, share in self.driven.items()]
+        if self.lowered is not None:
+            self.imposed[np.searchsorted(self.constrained, self.lowered)] = self.block_speed
         self._work: Array = np.zeros(self.size)
+        #: whether the wall may act on the present state; None: that has not been asked yet
+        self.near_wall: bool | None = None
 
     # -- what acts ---------------------------------------------------------------------------------------------------
 
@@ -224,8 +265,33 @@ class Rod:
         """A coefficient that can be changed without compiling again."""
         return dolfinx.fem.Constant(self.mesh, np.asarray(value, dtype=np.float64))
 
+    def _load(self, value: Any) -> dolfinx.fem.Constant:
+        """A coefficient of :meth:`_loads`: a new one, or the next of those that are there."""
+        if self._present is None:
+            self._loading.append(self.constant(value))
+            return self._loading[-1]
+        found = next(self._present)
+        found.value = np.asarray(value, dtype=np.float64)
+        return found
+
+    def take(self, scene: Scene) -> None:
+        """Go on with another scene, as if this rod had been made of it; both must be equal in :func:`structure`."""
+        self.scene = scene
+        for name in ("_end_forces", "_tip_moves", "_weight_vector", "_mass_at_wall", "_damped", "outer_diameter"):
+            self.__dict__.pop(name, None)
+        _fill(self.section.field, scene, self.string)
+        if self.wall is not None:
+            self.wall.begin(*self._hole_and_radius())
+        self.bit_measured_depth = self.length
+        self.tip_force.value, self.tip_moment.value = scene.ends.tip_force, scene.ends.tip_moment
+        self._present = iter(self._loading)
+        self.loads = self._loads()
+        self._present = None
+        self.set_bit_load(0.0, 0.0)
+
     def _loads(self) -> vw.Loads:
-        scene, ends, c = self.scene, self.scene.ends, self.constant
+        scene, ends, c = self.scene, self.scene.ends, self._load
+        g = c(np.asarray(scene.gravity.direction) * scene.gravity.magnitude)
         hook_load = scene.nominal().hook_load if scene.hangs else 0.0
         wall = None
         if self.wall is not None and scene.contact is not None:
@@ -239,6 +305,7 @@ class Rod:
                 method=k.method,
                 projected=k.projected and not self.literal,
                 retardation=c(self.wall.retardation) if self.wall.retardation else None,
+                load=self.section["mass"] * g if k.normal_force == "weight" else None,
             )
         bit = None
         if self.has_bit:
@@ -246,9 +313,14 @@ class Rod:
             if self.bends and scene.bit is not None:
                 bit = replace(bit, hole=Hole(self.bit_hole), guide=c(scene.bit.guide_stiffness))
         return vw.Loads(
-            g=c(np.asarray(scene.gravity.direction) * scene.gravity.magnitude),
+            g=g,
             u0=c(self._stress_free_curvature()),
-            top=vw.EndLoad(c((0.0, 0.0, -hook_load)), c((0.0, 0.0, 0.0)), c(ends.top_mass), c(ends.top_inertia)),
+            top=vw.EndLoad(
+                c(np.asarray(ends.top_force) - (0.0, 0.0, hook_load)),
+                c((0.0, 0.0, 0.0)),
+                c(ends.top_mass),
+                c(ends.top_inertia),
+            ),
             bottom=vw.EndLoad(self.tip_force, self.tip_moment, c(ends.bottom_mass), c(ends.bottom_inertia)),
             bit=bit,
             wall=wall,
@@ -256,10 +328,28 @@ class Rod:
             motor=self.drive.motor if self.drive is not None else None,
             mud=self._mud(),
             centreline=None if self.wall is None or self.wall.at_nodes is None else Hole(self.wall.at_nodes),
+            resistance=self._resistance(),
+            push=self.push if scene.motor is not None else None,
         )
 
+    def _resistance(self) -> Saturating | None:
+        bit = self.scene.bit
+        if bit is None or not self.scene.resists:
+            return None
+        # (7-5) and (7-6) as printed push the bit forward
+        sign = -1.0 if self.literal else 1.0
+        return Saturating(self._load(sign * bit.saturating.strength), self._load(bit.saturating.rate))
+
+    def resistance(self, speed: float) -> float:
+        """Force (N) of rock that saturates, against a lower end that advances with ``speed`` (m/s); 0 without it."""
+        bit = self.scene.bit
+        if bit is None or not self.scene.resists:
+            return 0.0
+        strength = -bit.saturating.strength if self.literal else bit.saturating.strength
+        return -strength * math.expm1(-bit.saturating.rate * max(0.0, speed))
+
     def _lump(self) -> vw.Lump | None:
-        alpha, c = self.scene.inertia.distributed, self.constant
+        alpha, c = self.scene.inertia.distributed, self._load
         if alpha == 1.0:
             return None
         mass, inertia = lumped_at_bit(self.scene)
@@ -289,19 +379,24 @@ class Rod:
         return self._touches and contact is not None and contact.closest_point == "field"
 
     def _wall(self) -> WallPoints | None:
-        scene, hole, contact = self.scene, self.scene.borehole, self.scene.contact
-        if hole is None or contact is None or not self._touches:
+        scene, contact = self.scene, self.scene.contact
+        if scene.borehole is None or contact is None or not self._touches:
             return None
-        radius = section_table(scene)[:, SECTION.index("contact_radius")][self.string.cells.values]
-        friction = np.array([contact.friction_static, contact.friction_dynamic])
-        by_cell = np.empty_like(radius)
-        by_cell[self.string.cells.indices] = radius
-        found = WallPoints(self.V, hole, by_cell, friction, self.wall_degree, self.ansatz)
+        found = WallPoints(self.V, *self._hole_and_radius(), self.wall_degree, self.ansatz)
         if scene.time.analysis == "dynamic":
             # multipliers that hold a point by its place alone throw it back with more than it brought
             least = scene.time.step if contact.method == "augmented" else 0.0
             found.retardation = max(contact.retardation_time, least)
         return found
+
+    def _hole_and_radius(self) -> tuple[Borehole, Array, Array]:
+        """Hole; what touches it (cells,), m; coefficients of friction (2,) where the hole has none of its own."""
+        hole, contact = self.scene.borehole, self.scene.contact
+        assert hole is not None and contact is not None
+        radius = section_table(self.scene)[:, SECTION.index("contact_radius")][self.string.cells.values]
+        by_cell = np.empty_like(radius)
+        by_cell[self.string.cells.indices] = radius
+        return hole, by_cell, np.array([contact.friction_static, contact.friction_dynamic])
 
     @property
     def wall_degree(self) -> int:
@@ -415,6 +510,7 @@ class Rod:
         """Copy a state into the coefficients of the forms, and find the hole around it."""
         self._u[:] = u
         self._u_dot[:] = u_dot
+        self.near_wall = None
         self.find_hole(self._u)
 
     def find_hole(self, u: Array, size: int = 0) -> None:
@@ -440,22 +536,33 @@ class Rod:
     def residual(self, t: float, u: Array, u_dot: Array, out: Array) -> None:
         """F(t, u, u-dot), shape (dofs,); end conditions replace the momentum rows of their dofs."""
         self.set_state(u, u_dot)
-        if self.drive is not None:
-            self.drive.at(t)
+        self.at(t)
         self._present_residual(out)
         if self.wall is not None and self.wall.trouble:
             out[:] = np.nan  # no step ends here
-        _hold(self.constrained, u, out, self.reaction)
-        if self.lowered is not None:
-            out[self.lowered] -= self.block_speed
+        _hold(self.constrained, u, self.imposed, out, self.reaction)
+
+    def at(self, t: float) -> None:
+        """Loads and imposed speeds (:attr:`imposed`) of time t (s)."""
+        if self.drive is not None:
+            self.drive.at(t)
+        if (motor := self.scene.motor) is not None:
+            self._push_value[...] = motor.force * math.sin(motor.frequency * t)
         if self.driven:
             _, speed, _ = self.scene.top_drive.motion(t)
-            for row, share in self.driven.items():
-                out[row] -= share * speed
+            for place, share in self._driven_at:
+                self.imposed[place] = share * speed
 
     @property
     def _present_residual(self) -> VectorForm:
-        return self._residual if self._near_wall() else self._residual_off_wall
+        by_wall, off_wall = self.residual_forms
+        self.near_wall = self._near_wall()
+        return by_wall if self.near_wall else off_wall
+
+    @property
+    def residual_forms(self) -> tuple[VectorForm, VectorForm]:
+        """The residual, by the wall and off it."""
+        return self._residual, self._residual_off_wall
 
     def observe(self, u: Array, u_dot: Array) -> None:
         """Take a state and its reactions, as :meth:`residual` does, without the residual."""
@@ -553,11 +660,33 @@ class Rod:
             total += self._reaction(self.lowered) * self.block_speed
         for force, dof in self._end_forces:
             total += force * self._u[dof]
-        if np.any(self.tip_moment.value):
+        total += self.push_power()
+        if self._tip_moves:
             names = self.ansatz.v_names
             w = [self._u[self.dof(-1, n)] if n in names else 0.0 for n in ("w1", "w2", "w3")]
             total += self.tip_moment.value @ (self.shape()[1][-1] @ w)
         return float(total)
+
+    def push_power(self) -> float:
+        """Power (W) that a mud motor puts into the string at the present state."""
+        return 0.0 if self._advancing is None else float(self._push_value[()] * self._u[self._advancing])
+
+    def tip(self) -> Array:
+        """Where the lower end is in the present state (3,), m."""
+        found = np.array([0.0, 0.0, self.length])
+        for k, name in enumerate(("r1", "r2", "r3")):
+            if name in self.ansatz.x_names:
+                found[k] = self._u[self.dof(-1, name)]
+        return found
+
+    def end_speed(self, u: Array) -> float:
+        """Speed (m/s) of the lower end along e3 in a state; 0 of a model that does not stretch."""
+        return 0.0 if self._advancing is None else float(u[self._advancing])
+
+    @cached_property
+    def _tip_moves(self) -> bool:
+        """Whether there is a moment at the tip."""
+        return bool(np.any(self.tip_moment.value))
 
     @cached_property
     def _end_forces(self) -> list[tuple[float, int]]:
@@ -594,10 +723,17 @@ class Rod:
     def powers(self) -> dict[str, float]:
         """Power (W) of damping (also of mud), gravity, contact and friction at the present state; positive takes energy
         from the string. Contact and friction are left out where the string is off the wall."""
-        near = self._near_wall()
-        power = {name: form() for name, form in self._powers.items() if name == "damping" or near}
+        near = self._near_wall() if self.near_wall is None else self.near_wall
+        wanted = {"damping": self._damped, "contact": near, "friction": near}
+        power = {name: form() for name, form in self._powers.items() if wanted[name]}
+        power.setdefault("damping", 0.0)
         power["gravity"] = float(self._weight_vector @ self._u)
         return power
+
+    @cached_property
+    def _damped(self) -> bool:
+        """Whether anything but the wall takes energy from a string in motion."""
+        return self.scene.mud is not None or any(s.retardation_time for s in self.scene.string)
 
     def augment(self, shift: float) -> bool:
         """Move the multipliers of the augmented Lagrangian to the present state; False where they may stay.
@@ -631,12 +767,20 @@ class Rod:
         mass = self.section.field.x.array.reshape(-1, len(SECTION))[V.dofmap.list[:, 0], SECTION.index("mass")]
         return np.repeat(mass, len(self.wall.basis))
 
+    @property
+    def wall_reach(self) -> float:
+        """Distance (m) from which on the wall acts on a string at rest; infinite where it always does."""
+        contact = self.scene.contact
+        if contact is None or contact.normal_force == "weight":
+            return math.inf
+        return contact.smoothing if contact.method == "smooth" else 0.0
+
     def _near_wall(self) -> bool:
         """Whether the wall may act on any point of the present state (also where one has lost the hole)."""
         wall, contact = self.wall, self.scene.contact
         if wall is None or contact is None:
             return False
-        reach = contact.smoothing if contact.method == "smooth" else 0.0
+        reach = self.wall_reach
         if wall.retardation:
             at = self.ansatz.index("v1")
             reach += wall.retardation * float(np.abs(self._u.reshape(-1, self.ansatz.size)[:, at : at + 3]).max()) * 2
@@ -678,14 +822,25 @@ class Rod:
         torque = friction(at, self.ansatz.twist(v, at), about, self.section["contact_radius"], self.loads.wall)
         return self.scalar_form(torque * self.on.wall)
 
+    def _side_force(self) -> Array:
+        """Normal force per length (points,), N/m, of the present state."""
+        wall, contact = self.wall, self.scene.contact
+        assert wall is not None and contact is not None
+        if contact.normal_force == "wall":
+            return wall.side_force(self._u, contact)
+        t = wall.data[:, 3:6] / np.linalg.norm(wall.data[:, 3:6], axis=1)[:, None]
+        g = self.loads.g.value
+        return self._mass_at_wall * np.asarray(np.linalg.norm(g - (t @ g)[:, None] * t, axis=1), dtype=np.float64)
+
     def wall_row(self) -> dict[str, float]:
         """What the wall does to the present state: side force (N, its size summed along the string), friction torque
         about the string's axis (N m, against its spin), deepest penetration (m)."""
         assert self.wall is not None and self.scene.contact is not None
-        force = self.wall.side_force(self._u, self.scene.contact)
+        force = self._side_force()
+        torque = self._wall_torque if "w3" in self.ansatz.v_names else None
         return {
             "side_force": float(force @ self.wall.weights),
-            "wall_torque": self._wall_torque() if self._near_wall() else 0.0,
+            "wall_torque": torque() if torque is not None and self._near_wall() else 0.0,
             "penetration": max(0.0, -float(self.wall.gap)),
         }
 
@@ -764,7 +919,7 @@ class Rod:
                 "wall_arc_length": wall.arc_length[o],
                 "wall_depth": wall.p[o],
                 "wall_gap": wall.gaps(self._u)[o],
-                "wall_side_force": wall.side_force(self._u, self.scene.contact)[o],
+                "wall_side_force": self._side_force()[o],
             }
         named = {"w3": "spin", "v3": "axial_speed", "phi": "angle"}
         for component, name in named.items():

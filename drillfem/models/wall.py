@@ -38,11 +38,10 @@ class WallPoints:
     ) -> None:
         """radius (cells,): what touches the wall, m; friction (2,): coefficients where the hole has none of its own;
         ansatz: of the unknowns (V), the position first."""
-        self.hole = hole
         names = ansatz.x_names
         #: axes e1, e2, e3 that position and velocity of a node are given along; where the velocity and the measured
         #: depth of the closest point stand among its unknowns
-        self._axes = [i for i, name in enumerate(("r1", "r2", "r3")) if name in names]
+        self.axes = [i for i, name in enumerate(("r1", "r2", "r3")) if name in names]
         self._speed = len(names)
         self._depth = names.index(DEPTH) if DEPTH in names else None
         self.quadrature_degree = degree
@@ -56,20 +55,26 @@ class WallPoints:
         self.data: Array = self.field.x.array.reshape(-1, width)
         self.at_nodes = None if self._depth is None else dolfinx.fem.Function(lagrange(V.mesh, order, width))
         assert self.at_nodes is None or np.array_equal(self.at_nodes.function_space.dofmap.list, V.dofmap.list)
-        self.data[:, 11:13] = friction
         vander = np.polynomial.legendre.legvander
         self.basis = np.ascontiguousarray(vander(2 * at[:, 0] - 1, order) @ np.linalg.inv(vander(2 * nodes - 1, order)))
         self.cells = np.ascontiguousarray(V.dofmap.list, dtype=np.int32)
         self.size = V.dofmap.index_map_bs
-        self.radius = np.ascontiguousarray(radius, dtype=np.float64)
         s = V.tabulate_dof_coordinates()[:, 0][self.cells]
         #: arc length of the points (points,), m; and of the string that each stands for
         self.arc_length: Array = (s @ self.basis.T).reshape(-1)
         self.weights: Array = np.outer(s.max(axis=1) - s.min(axis=1), weights).reshape(-1)
         self.p: Array = self.arc_length.copy()
-        self.gap = np.inf
         #: time (s) whose approach counts as penetration; 0: the normal force knows no speed
         self.retardation = 0.0
+        self.begin(hole, radius, friction)
+
+    def begin(self, hole: Borehole, radius: Array, friction: Array) -> None:
+        """Forget all states, and go on in this hole; arguments as of the constructor."""
+        self.hole, self.radius = hole, np.ascontiguousarray(radius, dtype=np.float64)
+        self.data[:] = 0.0
+        self.data[:, 11:13] = friction
+        self.p[:] = self.arc_length
+        self.gap = np.inf
         #: why the last :meth:`update` failed; empty if it did not
         self.trouble = ""
 
@@ -85,7 +90,7 @@ class WallPoints:
         """Positions of the nodes (nodes, 3), m, in the order of the unknowns, or the vectors at ``first``."""
         block = u.reshape(-1, size)
         r = np.zeros((len(block), 3))
-        r[:, self._axes] = block[:, first : first + len(self._axes)]
+        r[:, self.axes] = block[:, first : first + len(self.axes)]
         return r
 
     def seek(self, u: Array) -> None:
@@ -106,7 +111,7 @@ class WallPoints:
         """
         size, r = size or self.size, u
         follow = self._depth is not None and size == self.size
-        if len(self._axes) < 3:
+        if len(self.axes) < 3:
             size, r = 3, self._nodal(u, size).reshape(-1)
         if follow:
             found = self._follow(u, self._points(r, size))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from drillfem.errors import DrillfemError, SceneError
 from drillfem.scene import Scene, load_scene
 
-from . import appendix_b, chapter4, chapter5, chapter6
+from . import appendix_b, chapter4, chapter5, chapter6, chapter7
 from .claims import Case, Claim, Experiment, Run, Value, Variation
 from .imitation import Numerics, imitate
 from .signals import Signals
@@ -20,7 +20,13 @@ from .signals import Signals
 if TYPE_CHECKING:
     import xarray as xr
 
-CASES: tuple[Case, ...] = (*chapter4.CASES, *chapter5.CASES, *chapter6.CASES, *appendix_b.CASES)
+CASES: tuple[Case, ...] = (
+    *chapter4.CASES,
+    *chapter5.CASES,
+    *chapter6.CASES,
+    *chapter7.CASES,
+    *appendix_b.CASES,
+)
 """What is compared if nothing is named, in the order of the thesis."""
 
 LONG: tuple[Case, ...] = chapter6.LONG

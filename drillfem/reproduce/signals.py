@@ -25,7 +25,22 @@ Window = tuple[float, float]
 SPIN, ADVANCE, TORQUE, WEIGHT, DEPTH = "bit_angular_speed", "bit_axial_speed", "bit_torque", "bit_weight", "bit_depth"
 TOP_SPIN, TOP_TORQUE, POWER = "top_angular_speed", "top_torque", "top_power"
 SIDE_FORCE, WALL_TORQUE, PENETRATION = "side_force", "wall_torque", "penetration"
-NAMES = (SPIN, ADVANCE, TORQUE, WEIGHT, DEPTH, TOP_SPIN, TOP_TORQUE, POWER, SIDE_FORCE, WALL_TORQUE, PENETRATION)
+BIT_WORK, END_WORK = "work_bit", "work_hook_load"
+NAMES = (
+    SPIN,
+    ADVANCE,
+    TORQUE,
+    WEIGHT,
+    DEPTH,
+    TOP_SPIN,
+    TOP_TORQUE,
+    POWER,
+    SIDE_FORCE,
+    WALL_TORQUE,
+    PENETRATION,
+    BIT_WORK,
+    END_WORK,
+)
 LINES = 60
 """How many lines of a spectrum are looked at."""
 

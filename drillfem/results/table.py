@@ -66,7 +66,13 @@ def _performance(prefix: str = "", word: str = "") -> tuple[Row, ...]:
     )
 
 
-WHOLE = (Row("drilled_depth", "depth drilled", "m"), *_performance("mean_", "mean "))
+WHOLE = (
+    Row("drilled_depth", "depth drilled", "m"),
+    *_performance("mean_", "mean "),
+    Row("power_in", "mean power put in at the ends", "W"),
+    Row("power_out", "  taken out by the rock", "W"),
+    Row("power_ratio", "  ratio", "1"),
+)
 LATE = (
     *_performance(),
     *_wave("torsional", "rad/s", 1.0),
@@ -125,6 +131,7 @@ def statistics(result: Result, window: tuple[float, float] | None = None) -> Sta
         numbers["off_bottom_fraction"] = float(share @ (values["bit_weight"] <= 0))
         numbers["mean_bit_torque"] = float(share @ values["bit_torque"])
         numbers["mean_bit_weight"] = float(share @ values["bit_weight"])
+    numbers |= {name: summary[name] for name in ("power_in", "power_out", "power_ratio") if name in summary}
     numbers["energy_balance_error"] = summary.get("energy_balance_error")
     if wall := summary.get("wall_seconds"):
         numbers["simulated_per_wall"] = summary["simulated_seconds"] / wall
@@ -134,7 +141,7 @@ def statistics(result: Result, window: tuple[float, float] | None = None) -> Sta
 def nominal_statistics(result: Result) -> Statistics:
     """What steady cutting at the scene's top speed and weight on bit would give."""
     scene = result.scene
-    if getattr(scene, "bit", None) is None or "bit_depth" not in result.history:
+    if not getattr(scene, "bites", False) or "bit_depth" not in result.history:
         return {}
     nominal = scene.nominal()
     if nominal is None:

@@ -49,6 +49,7 @@ class ResultWriter:
 
     Attributes:
         restart: (time in s, state) of the checkpoint a resumed run must continue from, else ``None``.
+        pictured: whether pictures are wanted; a run that is told otherwise makes none.
 
     Raises:
         SceneError: the folder cannot take a new result, or (``resume``) is none, or another process writes to
@@ -71,6 +72,7 @@ class ResultWriter:
             if name in STANDARD and units != STANDARD[name].units:
                 raise ValueError(f"{name} is stored in {STANDARD[name].units}, not in {units}")
         self.restart: tuple[float, dict[str, Any]] | None = None
+        self.pictured = True
         self._scene, self._field_units = scene, dict(field_units or {})
         self._summary: dict[str, Any] = {
             "model": model,

@@ -28,6 +28,7 @@ from drillfem.scene.tables import (
     Time,
     TopDrive,
 )
+from drillfem.scene.uncertain import Random
 
 __all__ = [
     "MODELS",
@@ -45,6 +46,7 @@ __all__ = [
     "Moduli",
     "Nominal",
     "Output",
+    "Random",
     "Reference",
     "Rock",
     "Scene",

@@ -68,12 +68,12 @@ def _ends(scene: Scene) -> Iterator[tuple[str, End, End]]:
     ends = scene.ends
     mass, inertia = lumped_at_bit(scene) if scene.inertia.distributed != 1 else (0.0, 0.0)
     # a string that drills hangs on a constant load
-    hangs = ends.top == "free" or scene.hangs
+    hangs = ends.top in ("free", "sliding") or scene.hangs
     clamped = ends.bottom == "clamped"
     yield "axial", End(not hangs, ends.top_mass), End(clamped, ends.bottom_mass + mass)
     yield (
         "torsional",
-        End(ends.top in ("driven", "clamped"), ends.top_inertia),
+        End(ends.top in ("driven", "clamped", "sliding"), ends.top_inertia),
         End(clamped, ends.bottom_inertia + inertia),
     )
 

@@ -45,7 +45,8 @@ def between(low: float, high: float) -> Bound:
 @dataclasses.dataclass(frozen=True)
 class Key:
     """What a field means: `unit` is SI ("1" for a pure number), `count` the length of a list, `name` the TOML
-    key where it differs from the attribute, `default_text` says a default that depends on other keys."""
+    key where it differs from the attribute, `default_text` says a default that depends on other keys. `named`: the
+    entries have names of the user's own, in a tuple of tables (with a `name`) or of (name, number)."""
 
     doc: str
     unit: str = "1"
@@ -54,6 +55,7 @@ class Key:
     count: int | None = None
     name: str = ""
     default_text: str = ""
+    named: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,12 +83,14 @@ class Slot:
             return "one of " + ", ".join(k.choices) if k.choices else "one line of text, not empty"
         if typing.get_origin(self.type) is tuple:
             item = typing.get_args(self.type)[0]
+            if k.named:
+                return "a table of tables" if dataclasses.is_dataclass(item) else "a table of numbers"
             if dataclasses.is_dataclass(item):
                 return "one or more tables"
             if typing.get_origin(item) is tuple:
                 return "a list of rows of numbers"
             if item is str:
-                return "a list of any of " + ", ".join(k.choices)
+                return "a list of any of " + ", ".join(k.choices) if k.choices else "a list of texts"
             many = "numbers" if k.count is None else f"{k.count} numbers"
             return f"a list of {many}{limit}" + ("" if k.unit == "1" else f" in {k.unit}")
         return "a table with " + ", ".join(slots(self.type))
@@ -102,9 +106,10 @@ def key(
     count: int | None = None,
     name: str = "",
     default_text: str = "",
+    named: bool = False,
 ) -> Any:
     """Dataclass field that `read` understands; without a default the key is required."""
-    meta = Key(doc, unit, bound, tuple(choices), count, name, default_text)
+    meta = Key(doc, unit, bound, tuple(choices), count, name, default_text, named)
     return dataclasses.field(default=default, metadata={"key": meta})
 
 
@@ -118,6 +123,8 @@ def _slots(table: Any) -> dict[str, Slot]:
     hints = typing.get_type_hints(table)
     found = {}
     for f in dataclasses.fields(table):
+        if "key" not in f.metadata:
+            continue
         kind = hints[f.name]
         if isinstance(kind, types.UnionType):  # X | None: None only ever means "not given"
             kind = next(a for a in typing.get_args(kind) if a is not types.NoneType)
@@ -191,6 +198,8 @@ def _convert(slot: Slot, value: Any, path: str) -> Any:
     kind = slot.type
     if dataclasses.is_dataclass(kind):
         return read(typing.cast(type, kind), value, path)
+    if slot.key.named:
+        return _named(slot, value, path)
     if typing.get_origin(kind) is not tuple:
         return _scalar(slot, value, path)
     item = typing.get_args(kind)[0]
@@ -199,6 +208,20 @@ def _convert(slot: Slot, value: Any, path: str) -> Any:
         raise SceneError(f"{path} = {shown(value)}: must be {slot.expects}")
     entry = dataclasses.replace(slot, type=item)
     return tuple(_convert(entry, v, join(path, i)) for i, v in enumerate(value))
+
+
+def _named(slot: Slot, value: Any, path: str) -> Any:
+    """Tuple of tables that carry their names, or of (name, number)."""
+    if not isinstance(value, Mapping):
+        raise SceneError(f"{path} = {shown(value)}: must be {slot.expects}")
+    item = typing.get_args(slot.type)[0]
+    if dataclasses.is_dataclass(item):
+        made: dict[str, Any] = {}
+        for name, raw in value.items():
+            made[name] = dataclasses.replace(read(typing.cast(Any, item), raw, join(path, name)), name=name)
+        return tuple(made.values())
+    entry = dataclasses.replace(slot, type=typing.get_args(item)[1], key=dataclasses.replace(slot.key, named=False))
+    return tuple((name, _convert(entry, number, join(path, name))) for name, number in value.items())
 
 
 def _scalar(slot: Slot, value: Any, path: str) -> Any:
@@ -233,7 +256,11 @@ def write(table: Any) -> dict[str, Any]:
     plain: dict[str, Any] = {}
     for name, slot in slots(type(table)).items():
         value = getattr(table, slot.attribute)
-        if value is not None and value == value:
+        if value is None or value != value or (slot.key.named and not value):
+            continue
+        if slot.key.named:
+            plain[name] = {x.name: write(x) for x in value} if dataclasses.is_dataclass(value[0]) else dict(value)
+        else:
             plain[name] = _plain(value)
     return plain
 

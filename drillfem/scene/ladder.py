@@ -82,6 +82,8 @@ def obstacle(scene: Scene, model: str) -> str:
     if model == "soft-string":
         if scene.bites:
             return "its bit touches no rock"
+        if scene.resists or scene.motor is not None or any(ends.top_force):
+            return "it does not move along its axis"
         if scene.contact is None or scene.hole.kind == "none":
             return "it needs a hole and [contact], for its friction"
         return "" if scene.reference.shape == "straight" else "the unstressed string is bent"
@@ -100,12 +102,15 @@ def obstacle(scene: Scene, model: str) -> str:
             return "gravity acts across the string"
         if across(ends.tip_force) or across(ends.tip_moment):
             return "the load at the tip bends the string"
+        if across(ends.top_force):
+            return "the load at the top acts across the string"
         if (turns and across(scene.top_drive.axis)) or any(map(across, motion)):
             return "the motion is not along and about the string's axis"
-        if model == "torsional" and not scene.drills and (ends.tip_force[2] or motion[0][2]):
+        along_axis = ends.tip_force[2] or ends.top_force[2] or motion[0][2] or scene.motor or scene.resists
+        if model == "torsional" and not scene.drills and along_axis:
             return "the string is loaded or moves along its axis"
     if model == "planar":
-        if scene.bit is not None:
+        if scene.bit is not None and not scene.resists:
             return "a bit turns about the string's axis, which the plane x-z has no room for"
         if turns and abs(abs(scene.top_drive.axis[1]) - 1) > 1e-9:
             return "the top drive turns about another axis than e2"
@@ -115,6 +120,7 @@ def obstacle(scene: Scene, model: str) -> str:
             return why
         out = (
             ends.tip_force[1],
+            ends.top_force[1],
             gravity[1],
             motion[0][1],
             ends.tip_moment[0],
@@ -328,7 +334,15 @@ def critical_weight(scene: Scene, bit_tilts: bool = False) -> float:
         by_weight += share * (h * (below + w * h * (1 - x)))[:, None, None] * slopes
         by_load += share * h[:, None, None] * slopes
     ends = scene.ends
-    upright = {"clamped": (0, 1), "driven": (0, 1), "hung": (0, 1), "bit": (0, 1), "pinned": (0,), "guided": (0,)}
+    upright = {
+        "clamped": (0, 1),
+        "driven": (0, 1),
+        "hung": (0, 1),
+        "sliding": (0, 1),
+        "bit": (0, 1),
+        "pinned": (0,),
+        "guided": (0,),
+    }
     bottom = (0,) if ends.bottom == "bit" and bit_tilts else upright.get(ends.bottom, ())
     held = [*upright.get(ends.top, ()), *(2 * n + i for i in bottom)]
     free = np.setdiff1d(np.arange(2 * n + 2), held)

@@ -35,7 +35,7 @@ def nominal(scene: Scene, spin: float | None = None, weight: float | None = None
     drive, bit, rock = scene.top_drive, scene.bit, scene.rock
     weight = scene.hanging_weight if weight is None else weight
     speed = (drive.speed or 0.0) if spin is None else spin
-    if bit is None or bit.kind == "free" or (bit.kind == "cutting" and rock is None):
+    if bit is None or bit.kind in ("free", "saturating") or (bit.kind == "cutting" and rock is None):
         return Nominal(0.0, 0.0, 0.0, weight if drive.hook_load is None else drive.hook_load, 0.0)
     load = drive.weight_on_bit
     if load is None and drive.hook_load is not None:
@@ -237,7 +237,7 @@ def describe(scene: Scene) -> list[tuple[str, str]]:
             rows.append((label + "retardation time", q(s.retardation_time, "s")))
     if scene.ends.top in ("driven", "clamped") and all(s.rotary_inertia > 0 for s in scene.string):
         rows.append(("first torsional frequency", f"{torsional_frequency(scene):.4g} Hz"))
-    if scene.bit is not None:
+    if scene.bit is not None and not scene.resists:
         rows += [("hook load", f"{n.hook_load / 1e3:.6g} kN"), ("weight on bit", q(n.weight_on_bit, "N"))]
     if scene.bites and not scene.drills:
         rows += [
@@ -270,4 +270,5 @@ def describe(scene: Scene) -> list[tuple[str, str]]:
             ("omega_0 (speed)", f"{d.omega_0:.4g}"),
             ("W_0 (weight on bit)", f"{d.W_0:.4g}"),
         ]
+    rows += [(f"random: {r.name}", r.spoken) for r in scene.random]
     return rows

@@ -85,7 +85,8 @@ def reference() -> str:
             inner = _table(slot.type)
             if (inner is not None and name != "material") or (inner is not None and not path):
                 inside = f"{path.strip('[]')}.{name}" if path else name
-                nested.append((f"[[{inside}]]" if typing.get_origin(slot.type) is tuple else f"[{inside}]", inner))
+                many = f"[{inside}.NAME]" if slot.key.named else f"[[{inside}]]"
+                nested.append((many if typing.get_origin(slot.type) is tuple else f"[{inside}]", inner))
         queue = nested + queue
     lines += _section("## `[dimensionless]`", Numbers)
     return "\n".join(lines) + "\n"

@@ -31,6 +31,7 @@ from drillfem.scene.tables import (
     Inertia,
     Initial,
     Mesh,
+    Motor,
     Mud,
     Output,
     Reference,
@@ -39,6 +40,7 @@ from drillfem.scene.tables import (
     Time,
     TopDrive,
 )
+from drillfem.scene.uncertain import Random, at_means
 
 if TYPE_CHECKING:
     from drillfem.boreholes import Borehole
@@ -76,6 +78,7 @@ class Scene:
     mud: Mud | None = key("drilling fluid", default=None, default_text="none")
     top_drive: TopDrive = key("what turns the string, and the weight on the bit", default=TopDrive())
     bit: Bit | None = key("the bit", default=None, default_text="none")
+    motor: Motor | None = key("mud motor that shakes the lower end", default=None, default_text="none")
     rock: Rock | None = key("the rock; needed by a cutting bit", default=None, default_text="none")
     initial: Initial = key("the state at the start", default=Initial())
     ends: Ends = key("how the string is held and loaded at its ends", default=Ends())
@@ -86,12 +89,18 @@ class Scene:
     mesh: Mesh = key("finite elements along the string", default=Mesh())
     time: Time = key("how time or load advances", default=Time())
     output: Output = key("what is written, and how often", default=Output())
+    random: tuple[Random, ...] = key(
+        "what is not known: any number of random inputs, with names of your own",
+        default=(),
+        default_text="none",
+        named=True,
+    )
 
     # -- reading and writing ------------------------------------------------------------------------------
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Scene:
         """Scene from nested plain data: parsed TOML, or what `to_dict` gave. Raises SceneError."""
-        data = expanded(data)
+        data = at_means(cls, expanded(data))
         scene = read(cls, {"time": {}, **data})._completed()  # an absent [time] lacks its end, and shall say so
         for path, message in scene.problems():
             raise complaint(data, path, message)
@@ -104,6 +113,12 @@ class Scene:
             if section.get("material") == data.get("material"):
                 section.pop("material", None)  # comes back from [material]
         return data
+
+    def to_toml(self) -> str:
+        """The scene as the text of a TOML file; `load_scene` of it gives an equal scene, bit for bit."""
+        from drillfem.scene.toml import dumps
+
+        return dumps(self.to_dict())
 
     def checked(self) -> Scene:
         """The same scene, after all checks; for scenes changed in Python. Raises SceneError."""
@@ -174,8 +189,13 @@ class Scene:
 
     @property
     def bites(self) -> bool:
-        """Whether rock loads the bit, by the cutting law or the empirical one."""
-        return self.bit is not None and self.bit.kind != "free"
+        """Whether rock loads a turning bit, by the cutting law or the empirical one."""
+        return self.bit is not None and self.bit.kind not in ("free", "saturating")
+
+    @property
+    def resists(self) -> bool:
+        """Whether there is a bit that only resists being pushed."""
+        return self.bit is not None and self.bit.kind == "saturating"
 
     @property
     def hangs(self) -> bool:
@@ -223,6 +243,7 @@ class Scene:
         if self.hole.bends or self.hole.caliper or self.hole.section:
             _ = self.borehole  # complains itself
         yield from self._numerics_problems()
+        yield from self._random_problems()
         if self.model != "auto" and (why := self.obstacle(self.model)):
             able = [m for m in MODELS if not self.obstacle(m)]
             if able:
@@ -250,6 +271,8 @@ class Scene:
             if hole is not None and s.contact_diameter is not None and hole <= s.contact_diameter:
                 yield "hole.diameter", f"must be larger than {here}.contact_diameter = {s.contact_diameter:g} m"
         kinds = ", ".join(kind for kind in HOLES if kind != "none")
+        if self.contact is not None and self.contact.normal_force == "weight" and self.mud is not None:
+            yield "contact.normal_force", "must be 'wall' where there is [mud], which carries some of the weight"
         if self.contact is not None and self.hole.kind == "none":
             yield "hole.kind", f"must be one of {kinds} where there is [contact]"
         if self.hole.bends and self.contact is None:
@@ -273,8 +296,15 @@ class Scene:
             yield "ends.top", f"must be 'driven' where top_drive.kind = {drive.kind!r}"
         if ends.bottom == "bit" and self.bit is None:
             yield "ends.bottom", "must be one of free, guided, clamped, or there must be a [bit]"
-        if ends.bottom != "bit" and self.bit is not None:
+        if ends.bottom != "bit" and self.bit is not None and not self.resists:
             yield "ends.bottom", "must be 'bit' where there is a [bit]"
+        for name, there in (("bit.kind", self.resists), ("motor", self.motor is not None)):
+            if there and self.hole.bends:
+                yield name, "acts along e3: the hole must be straight, and along it"
+        if self.motor is not None and self.bites:
+            yield "motor", f"must be left out where bit.kind = {self.bit.kind if self.bit else None!r}"
+        if any(ends.top_force) and ends.top == "driven":
+            yield "ends.top_force", "must be left out where ends.top = 'driven': the hook carries the string"
         held = ends.top in ("clamped", "hung", "driven") or ends.bottom == "clamped"
         if self.time.analysis == "static" and not held:
             yield (
@@ -287,7 +317,7 @@ class Scene:
         if self.inertia.distributed != 1 and not self.drills:
             yield "inertia.distributed", "must be 1 where there is no cutting bit to lump inertia at"
         allowed: tuple[str, ...] = ("nominal", "rest", "literal", "laid")
-        if bit is None or bit.kind == "free":
+        if not self.bites:
             allowed = ("rest", "given") if self.hole.kind == "none" else ("rest", "given", "laid")
         if self.hole.bends:
             allowed = tuple(x for x in allowed if x in ("nominal", "laid"))
@@ -306,14 +336,14 @@ class Scene:
             if drive.hook_load is not None and self.hole.kind == "none":
                 yield "top_drive.hook_load", "must be left out where there is no [bit] and no hole"
             return
-        if bit.kind == "free":
+        if not self.bites:
             if drive.weight_on_bit:
                 yield (
                     "top_drive.weight_on_bit",
-                    "must be 0 or left out for bit.kind = 'free', which carries nothing",
+                    f"must be 0 or left out for bit.kind = {bit.kind!r}, which carries nothing",
                 )
             if drive.hook_load is not None and self.hole.kind == "none":
-                yield "top_drive.hook_load", "must be left out for bit.kind = 'free': it is the whole weight"
+                yield "top_drive.hook_load", f"must be left out for bit.kind = {bit.kind!r}: it is the whole weight"
             return
         if bit.kind == "empirical":
             if self.time.analysis == "static":
@@ -441,6 +471,16 @@ class Scene:
             yield "time.adaptive", f"must be false where time.engine = {self.engine!r}, whose steps are equal"
         if time.integrator == "arkimex" and not 2 <= time.order <= 5:
             yield "time.order", "must be from 2 to 5 where time.integrator = 'arkimex'"
+
+    def _random_problems(self) -> Iterator[tuple[str, str]]:
+        """Of friction that varies along the hole at random, and is given along it as well."""
+        fields = [r.name for r in self.random if r.is_field]
+        if fields and self.contact is not None and self.contact.friction_profile is not None:
+            yield "contact.friction_profile", f"must be left out where [random.{fields[0]}] gives it"
+        for i, stretch in enumerate(self.hole.section or ()):
+            for name in ("friction_static", "friction_dynamic"):
+                if fields and getattr(stretch, name) is not None:
+                    yield f"hole.section.{i}.{name}", f"must be left out where [random.{fields[0]}] gives it"
 
     # -- which engine runs it ---------------------------------------------------------------------------------
     @property

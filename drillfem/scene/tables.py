@@ -209,6 +209,12 @@ class Contact:
         "friction from the sliding speed along the wall only (false: the whole speed, as printed)",
         default=True,
     )
+    normal_force: str = key(
+        "that friction takes: 'wall': of the contact; 'weight': the string's weight across the hole, everywhere and "
+        "always, while stiffness holds the string on the centreline (chapter 7, case B)",
+        choices=("wall", "weight"),
+        default="wall",
+    )
     closest_point: str = key(
         "how the hole's closest point is found: 'newton' per point, or as a 'field' solved with the rod (D-6)",
         choices=("newton", "field"),
@@ -218,6 +224,9 @@ class Contact:
     def check(self) -> Iterator[tuple[str, str]]:
         if self.friction_dynamic > self.friction_static:
             yield "friction_dynamic", f"must not exceed friction_static = {self.friction_static:g}"
+        for name in ("method", "closest_point", "retardation_time"):
+            if self.normal_force == "weight" and getattr(self, name) != slots(Contact)[name].default:
+                yield name, "must be left out where normal_force = 'weight', which knows no penetration"
         rows = self.friction_profile or ()
         if any(len(row) != 3 for row in rows):
             yield "friction_profile", "must have rows of 3 numbers"
@@ -387,15 +396,27 @@ class Empirical:
     )
 
 
+@dataclass(frozen=True)
+class Saturating:
+    """Resistance c1 (1 - exp(-c2 v)) of rock to a bit that advances with v > 0, none to one that comes back (7-6)."""
+
+    strength: float = key("c_1: resistance to a fast bit", "N", NOT_NEGATIVE, default=1400.0)
+    rate: float = key("c_2: 1/c_2 is the speed over which it builds up", "s/m", POSITIVE, default=400.0)
+
+
 _BY_CUTTING = "required by a cutting bit"
 _CUTS = ("radius", "blades", "wear_flat_length", "friction", "inclination")
 
 
 @dataclass(frozen=True)
 class Bit:
-    """The bit: Detournay's drag bit (5-5)-(5-19), the empirical law of Appendix B.4, or a bit that touches nothing."""
+    """The bit: Detournay's drag bit (5-5)-(5-19), the empirical law of Appendix B.4, the axial one of chapter 7, or a
+    bit that touches nothing."""
 
-    kind: str = key("law of the bit; 'free' touches no rock", choices=("cutting", "free", "empirical"))
+    kind: str = key(
+        "law of the bit; 'saturating' resists being pushed along e3, and does not turn; 'free' touches no rock",
+        choices=("cutting", "free", "empirical", "saturating"),
+    )
     radius: float = key("radius a", "m", POSITIVE, default=math.nan, default_text=_BY_CUTTING)
     blades: int = key("number of blades n_b", bound=at_least(1), default=1, default_text=_BY_CUTTING)
     wear_flat_length: float = key(
@@ -428,6 +449,7 @@ class Bit:
     )
 
     empirical: Empirical = key("numbers of the empirical law", default=Empirical())
+    saturating: Saturating = key("numbers of the saturating law", default=Saturating())
     guide_stiffness: float = key(
         "force per length that holds the bit on the centreline of a curved hole", "N/m", POSITIVE, default=1e7
     )
@@ -449,6 +471,14 @@ class Bit:
             yield "blade_angles", "must be strictly increasing"
         if angles[0] < 0 or angles[-1] >= 2 * math.pi:
             yield "blade_angles", "must lie within one turn, from 0 to less than 360 deg"
+
+
+@dataclass(frozen=True)
+class Motor:
+    """A mud motor that shakes the lower end: a force F sin(omega t) along e3 (7-7)."""
+
+    force: float = key("amplitude f_0", "N", NOT_NEGATIVE)
+    frequency: float = key("angular frequency omega_f", "rad/s", NOT_NEGATIVE)
 
 
 @dataclass(frozen=True)
@@ -537,8 +567,8 @@ class Ends:
 
     top: str = key(
         "'driven': turned by the top drive, on the hook if there is a bit; 'clamped'; 'pinned': rotates "
-        "freely; 'hung': clamped but free to spin; 'free'",
-        choices=("driven", "clamped", "pinned", "hung", "free"),
+        "freely; 'hung': clamped but free to spin; 'sliding': clamped but free to move along e3; 'free'",
+        choices=("driven", "clamped", "pinned", "hung", "sliding", "free"),
         default="driven",
     )
     bottom: str = key(
@@ -553,6 +583,7 @@ class Ends:
     bottom_inertia: float = key(
         "rotary inertia about the axis lumped at the bottom", "kg m^2", NOT_NEGATIVE, default=0.0
     )
+    top_force: Vector = key("dead force at the top end, fixed frame", "N", count=3, default=(0.0, 0.0, 0.0))
     tip_force: Vector = key("dead force at the bottom end, fixed frame", "N", count=3, default=(0.0, 0.0, 0.0))
     tip_moment: Vector = key("dead moment at the bottom end, fixed frame", "N m", count=3, default=(0.0, 0.0, 0.0))
 

@@ -26,6 +26,9 @@ WORKS = {
 #: Part of the work at the wall that friction took; the rest is stored in the contact, and comes back.
 FRICTION = "work_friction"
 
+#: Part of the work of end forces that a mud motor did.
+MOTOR = "work_motor"
+
 _OF_THE_BIT = {name: v.units for name, v in STANDARD.items() if name.startswith("bit_") or name == "depth_of_cut"}
 #: History variables of every run, and those that rock adds: name to unit.
 COMMON = {name: v.units for name, v in STANDARD.items() if name not in _OF_THE_BIT}
@@ -35,13 +38,24 @@ TIP = {"tip_x": "m", "tip_y": "m", "tip_z": "m"}
 
 #: of the lower end of a string that turns, and of a string in contact with its hole
 TURNING = {name: _OF_THE_BIT[name] for name in ("bit_angular_speed", "bit_axial_speed", "bit_angle")}
+#: of a bit that only resists being pushed, and of a mud motor
+RESISTED = {name: _OF_THE_BIT[name] for name in ("bit_depth", "bit_axial_speed", "bit_weight")}
+PUSHED = {"motor_force": "N", MOTOR: "J"}
 WALL = {"side_force": "N", "wall_torque": "N m", "penetration": "m", FRICTION: "J"}
 
 
-def variables(drilling: bool, turning: bool = False, wall: bool = False) -> dict[str, str]:
+def variables(
+    drilling: bool, turning: bool = False, wall: bool = False, resisted: bool = False, pushed: bool = False
+) -> dict[str, str]:
     """History variables of a run, name to unit."""
     found = COMMON | dict.fromkeys(WORKS, "J") | (DRILLING if drilling else TIP)
-    return found | (TURNING if turning else {}) | (WALL if wall else {})
+    return (
+        found
+        | (TURNING if turning else {})
+        | (WALL if wall else {})
+        | (RESISTED if resisted else {})
+        | (PUSHED if pushed else {})
+    )
 
 
 def imbalance(works: dict[str, Array], stored: Array, stored_at_start: float, scale: float) -> tuple[Array, float]:

@@ -6,7 +6,7 @@ factorises (:mod:`drillfem.solve.native`) and who steps. Both engines take the s
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from ..compat import Array
 from ..models.rod import Rod
 from ..scene import Time
 from .dynamics import Marcher, integrator_of
-from .native import NativeScalar, NativeSolver, NativeStage, NativeVector
-from .newton import BitLoad, Outcome
+from .native import NativeNewton, NativeScalar, NativeSolver, NativeStage, NativeVector
+from .newton import BitCoupledNewton, BitLoad, Outcome
 
 #: as PETSc: what is left of a step whose equations find no solution, and how often
 _SHORTER, _MOST_REFUSED = 0.25, 10
@@ -32,11 +32,17 @@ class CompiledSystem:
         self.stage_fraction = 1.0
         size = rod.size
         self.x, self.x0, self.rate, self.known = (np.zeros(size) for _ in range(4))
-        self._f = np.zeros(size)
+        self.f, self.trusted = np.zeros(size), np.zeros(size)
         self._time, self._b = 0.0, 1.0
         self._has_rate = self._has_known = False
-        self._solver = NativeSolver(rod.tangent, rod)
+        if "solver" not in rod.kept:
+            rod.kept["solver"] = NativeSolver(rod.tangent, rod)
+        self._solver: NativeSolver = rod.kept["solver"]
         self._u, self._u_dot = rod.u.x.array, rod.u_dot.x.array
+        contact = rod.scene.contact
+        plain = contact is None or (contact.method != "augmented" and contact.closest_point == "newton")
+        #: whether C can do all iterations of a solve at once
+        self.plain = plain and not (rod.has_bit or rod.bends or rod.drive)
         self._stage = NativeStage(self.x, self.x0, self.rate, self._u, self._u_dot)
 
     def set(self, t: float, a: float, b: float, rate: bool, known: bool) -> None:
@@ -46,7 +52,7 @@ class CompiledSystem:
 
     def residual(self) -> Array:
         """See :class:`drillfem.solve.newton.System`."""
-        rod, f = self.rod, self._f
+        rod, f = self.rod, self.f
         self._stage(self.stage_fraction, self._b, self._has_rate)
         rod.residual(self._time, self._u, self._u_dot, f)
         if self.stage_fraction != 1.0:
@@ -54,6 +60,17 @@ class CompiledSystem:
         if self._has_known:
             f -= self.known
         return f
+
+    def iterate(self, newton: BitCoupledNewton) -> Outcome | None:
+        """See :class:`drillfem.solve.newton.System`."""
+        if not self.plain:
+            return None
+        self.rod.at(self._time)
+        return self._newton(newton, self.stage_fraction, self._b, self._has_rate, self._has_known)
+
+    @cached_property
+    def _newton(self) -> NativeNewton:
+        return NativeNewton(self, self._solver, self.rod)
 
     def settle(self) -> None:
         """See :class:`drillfem.solve.newton.System`."""

@@ -12,7 +12,7 @@ from ..compat import Array
 from ..errors import SimulationError
 from ..models.rod import Rod
 from ..results import ResultWriter
-from .audit import COMMON, FRICTION, TIP, WORKS, EnergyAudit, variables
+from .audit import COMMON, FRICTION, MOTOR, TIP, WORKS, EnergyAudit, variables
 from .contact import Rock, rock_of
 from .dynamics import Marcher, Stepper
 from .guards import runaway
@@ -50,6 +50,8 @@ class DirectRun:
         self.depth_start = self._bit_motion(u0)[0] if rod.turns else 0.0
         self._mark_bit(u0)
         self._first_row(u0)
+        if not rod.turns and scene.resists:
+            self.depth_start = float(rod.tip()[2])
 
     # -- start ---------------------------------------------------------------------------------------------------------
 
@@ -79,7 +81,8 @@ class DirectRun:
         kinetic, strain = rod.energies()
         self._stored = kinetic + strain
         self.audit = EnergyAudit(self._stored, rod.scene.time.start, self._powers(rod.scene.time.start))
-        self._works = self.audit.until(rod.scene.time.start)
+        self._row_time = rod.scene.time.start
+        self._works = self.audit.until(self._row_time)
 
     # -- one step ------------------------------------------------------------------------------------------------------
 
@@ -90,9 +93,12 @@ class DirectRun:
         drive = rod.top_torque(t) * rod.scene.top_drive.motion(t)[1]
         if rod.drive is not None:
             drive = rod.drive.power(t, *rod.top_motion(rod.u.x.array))
-        bit = 0.0
+        bit, scene = 0.0, rod.scene
         if rod.has_bit:
             bit = float(rod.bit_load @ rod.end_motion(rod.u.x.array)[1:])
+        elif scene.resists:
+            speed = rod.end_speed(rod.u.x.array)
+            bit = rod.resistance(speed) * speed
         out = {
             "work_top_drive": drive,
             "work_gravity": -p["gravity"],
@@ -101,6 +107,8 @@ class DirectRun:
             "dissipated": p["damping"],
             "work_wall": p.get("contact", 0.0) + p.get("friction", 0.0),
         }
+        if scene.motor is not None:
+            out[MOTOR] = rod.push_power()
         return out | ({FRICTION: p.get("friction", 0.0)} if rod.wall is not None else {})
 
     def step(self, until: float) -> float:
@@ -125,13 +133,16 @@ class DirectRun:
     def row(self, t: float) -> dict[str, float]:
         """History row of the present state."""
         rod, u = self.rod, self.stepper.u
+        out: dict[str, float] = {}
         torque, speed = rod.top_torque(t), rod.scene.top_drive.motion(t)[1]
         if rod.drive is not None:
             torque, speed = rod.drive.torque(), rod.drive.speed
         hook_load = rod.hook_load()
+        if rod.scene.motor is not None:
+            out = {"motor_force": float(rod.push.value)}
         rod.set_state(u, rod.u_dot.x.array)
         kinetic, strain = rod.energies()
-        out = {
+        out |= {
             "top_torque": torque,
             "top_angular_speed": speed,
             "hook_load": hook_load,
@@ -139,7 +150,7 @@ class DirectRun:
             "kinetic_energy": kinetic,
             "strain_energy": strain,
         }
-        self._stored, self._works = kinetic + strain, self.audit.until(t)
+        self._stored, self._works, self._row_time = kinetic + strain, self.audit.until(t), t
         out |= self._works
         if rod.wall is not None:
             out |= rod.wall_row()
@@ -153,12 +164,19 @@ class DirectRun:
                 "bit_weight": float(rod.bit_load[0]),
                 **self.rock.row(),
             }
-        r, _ = rod.shape()
-        return out | dict(zip(TIP, r[-1].tolist(), strict=True))
+        tip = rod.tip()
+        if rod.scene.resists:
+            speed = rod.end_speed(u)
+            out["bit_depth"], out["bit_axial_speed"] = float(tip[2]) - self.depth_start, speed
+            out["bit_weight"] = rod.resistance(speed)
+        return out | {name: float(x) for name, x in zip(TIP, tip, strict=True)}
+
+    def look(self) -> None:
+        """Let the rod take the present state, for a picture of it or as if there were one."""
+        self.rod.set_state(self.stepper.u, self.rod.u_dot.x.array)
 
     def fields(self) -> dict[str, Array]:
-        """Fields along the string at the present state."""
-        self.rod.set_state(self.stepper.u, self.rod.u_dot.x.array)
+        """Fields along the string, after :meth:`look`."""
         return self.rod.fields() | (self.rock.picture() if self.rock is not None else {})
 
     # -- save and load -------------------------------------------------------------------------------------------------
@@ -206,7 +224,7 @@ class DirectRun:
             {k: float(v) for k, v in state["works"].items()},
             float(state["audit_scale"]),
         )
-        self._works = {k: float(v) for k, v in state["works_of_row"].items()}
+        self._works, self._row_time = {k: float(v) for k, v in state["works_of_row"].items()}, t
         if self.rock is not None:
             self.rock.load(state["rock"])
         if rod.drive is not None:
@@ -229,7 +247,26 @@ class DirectRun:
             "rejected_steps": self.stepper.rejected,
             "energy_balance_error": self.audit.error(self._stored, self._works),
             "factorisations": self.stepper.newton.factorisations,
+            **self.power(self.rod.scene.time.start),
         }
+
+    def power(self, start: float) -> dict[str, float]:
+        """What loads at the ends of a string with a saturating bit put in (W), what the rock takes out, and the ratio
+        (7-10), (7-11): means from ``start`` (s) to the last row.
+
+        Recommended reading: out is what the rock takes. Literal: it is what the whole force on the bit does, with motor
+        and inertia.
+        """
+        rod, works, time = self.rod, self._works, self._row_time - start
+        if not rod.scene.resists or not time > 0:
+            return {}
+        taken = works["work_bit"]
+        if rod.literal:
+            mass, speed = rod.scene.ends.bottom_mass, rod.end_speed(self.stepper.u)
+            taken = works.get(MOTOR, 0.0) - taken - mass * speed**2 / 2
+        fed = works["work_hook_load"]
+        found = {"power_in": fed / time, "power_out": taken / time}
+        return found | ({"power_ratio": taken / fed} if fed > 0 else {})
 
     def destroy(self) -> None:
         """Free what is not Python's."""
@@ -246,14 +283,19 @@ def grid(start: float, interval: float, after: float) -> Iterator[float]:
 
 def run_dynamic(scene: Any, writer_of: Callable[..., ResultWriter], until: float, progress: Observer | None) -> Any:
     """March a scene to ``until``, writing as it goes. Returns the Result."""
-    rod = Rod(scene)
-    run = DirectRun(rod)
-    names = variables(rod.has_bit, rod.turns, rod.wall is not None)
+    return march(Rod(scene), writer_of, until, progress)
+
+
+def march(rod: Rod, writer_of: Callable[..., ResultWriter], until: float, progress: Observer | None) -> Any:
+    """:func:`run_dynamic` with a rod that is there."""
+    scene, run = rod.scene, DirectRun(rod)
+    names = variables(rod.has_bit, rod.turns, rod.wall is not None, scene.resists, scene.motor is not None)
     if not scene.drills:
         names.pop("rock_volume", None)  # the empirical law knows no surface
     writer = writer_of(rod.model, rod.size, names)
     start = scene.time.start
     out = scene.output
+    pictured = writer.pictured
     try:
         with writer, Interrupts() as interrupts:
             t = start
@@ -262,7 +304,9 @@ def run_dynamic(scene: Any, writer_of: Callable[..., ResultWriter], until: float
                 run.load(t, state)
             elif until > start:
                 writer.append(t, run.row(t))
-                writer.field(t, run.fields())
+                run.look()
+                if pictured:
+                    writer.field(t, run.fields())
                 writer.checkpoint(t, run.save())
             run.restart()
             rows, pictures = grid(start, out.interval, t), grid(start, out.fields_interval, t)
@@ -282,7 +326,9 @@ def run_dynamic(scene: Any, writer_of: Callable[..., ResultWriter], until: float
                         if progress is not None:
                             progress(t)
                     if t >= next_picture - tiny:
-                        writer.field(t, run.fields())
+                        run.look()
+                        if pictured:
+                            writer.field(t, run.fields())
                         next_picture = next(pictures)
                     if t >= next_save - tiny:
                         writer.checkpoint(t, run.save())

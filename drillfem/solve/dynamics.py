@@ -114,6 +114,10 @@ class PetscSystem:
         array: Array = self._f.getArray()
         return array
 
+    def iterate(self, newton: BitCoupledNewton) -> Outcome | None:
+        """See :class:`drillfem.solve.newton.System`."""
+        return None
+
     def settle(self) -> None:
         """See :class:`drillfem.solve.newton.System`."""
         self._snes.computeFunction(self.x, self._f)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..compat import Array
 from ..errors import SimulationError
+from ..forms.ansatz import Spatial
 from ..models.initial import initial_state
 from ..models.rod import Rod
 from ..models.steady import start_of_drilling, stretch_and_twist
@@ -36,6 +37,12 @@ def along_hole(rod: Rod) -> Array:
     return x.reshape(-1)
 
 
+def _straight(rod: Rod) -> Array:
+    """Configuration (nodes * fields, flat) of the unstressed string, in a hole along it."""
+    a = rod.ansatz
+    return np.ascontiguousarray(initial_state(rod).reshape(-1, a.size)[:, : len(a.x_names)]).reshape(-1)
+
+
 def transported(tangent: Array) -> Array:
     """Quaternions (n, 4) that turn e3 into the tangents (n, 3) without twist: each the last, turned the short way."""
     q = np.empty((len(tangent), 4))
@@ -58,7 +65,7 @@ def lay(rod: Rod) -> Array:
     """
     scene, statics = rod.scene, Statics(rod)
     assert rod.wall is not None
-    x = along_hole(rod)
+    x = along_hole(rod) if isinstance(rod.ansatz, Spatial) else _straight(rod)
     u = statics.state(x)
     rod.wall.seek(u)
     rod.find_hole(u)

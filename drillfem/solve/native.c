@@ -82,6 +82,35 @@ struct solver {
     double *g, *z;           /* work: ((n + 1) nv), (n ni) */
 };
 
+/* The wall of a hole around a string: what `search` of drillfem.boreholes takes, and what it found last. */
+struct wall {
+    uintptr_t search;
+    int32_t axes[3], n_axes; /* of a node's first unknowns */
+    double *r;               /* (nodes, 3): where the nodes are */
+    const int32_t *cells;
+    const double *basis, *radius, *knots, *coefficients, *radius_at, *hole_radius, *friction_at, *friction;
+    int64_t n_cells, per_cell, n_points, n_knots, n_radius, n_friction, width;
+    double *p, *data;
+    double found[4];
+    double reach, retardation; /* distance from the wall within which it acts; time of approach that adds to it */
+    int32_t always, speed;     /* whether it acts everywhere; place of the velocity */
+};
+
+/* Newton's method for one stage of a step of a string without rock, as `BitCoupledNewton._iterate` states it. */
+struct newton {
+    const struct form *near, *off, *jacobian; /* residual by the wall and off it */
+    const struct solver *solver;
+    struct wall *wall;       /* or NULL */
+    int32_t size, block, n_held;
+    double *x, *u, *u_dot, *f, *y, *trusted;
+    const double *x0, *rate, *known, *unit; /* unit (block): one over the tolerance */
+    const int32_t *held;
+    const double *target;    /* (n_held): speeds that are held */
+    double *reaction, *shift;
+    double factored, contraction;
+    int32_t renew, iterations, factorisations, touching; /* whether the wall may act on the last state */
+};
+
 void assemble_vector(const struct form *form, double *out, int32_t size, const int32_t *some, int32_t n_some);
 double assemble_scalar(const struct form *form);
 int factorise(const struct solver *s, const struct form *form);
@@ -89,6 +118,8 @@ void solve(const struct solver *s, const double *b, double *y);
 int lanes(void);
 void stage(int32_t size, const double *x, const double *x0, double a, double b, const double *rate, double *u,
            double *u_dot);
+int newton(struct newton *s, double a, double b, int with_rate, int with_known, int keep, int most, double slow,
+           double stalled, int patience);
 /* END */
 
 int lanes(void)
@@ -487,4 +518,118 @@ void stage(int32_t size, const double *x, const double *x0, double a, double b, 
         u[i] = a == 1.0 ? x[i] : x0[i] + a * change;
         u_dot[i] = b * change + (rate ? rate[i] : 0.0);
     }
+}
+
+typedef void search(const double *, int64_t, const int32_t *, int64_t, int64_t, const double *, int64_t, const double *,
+                    const double *, int64_t, const double *, const double *, const double *, int64_t, const double *,
+                    const double *, int64_t, double *, double *, int64_t, double *);
+
+/* Closest points of a state; 0 where one is lost, or beyond the ends of the hole */
+static int look(struct wall *w, int size, int block, const double *u)
+{
+    const int nodes = size / block;
+    for (int i = 0; i < nodes; i++)
+        for (int k = 0; k < w->n_axes; k++)
+            w->r[3 * i + w->axes[k]] = u[i * block + k];
+    ((search *)w->search)(w->r, nodes, w->cells, w->n_cells, w->per_cell, w->basis, w->n_points, w->radius, w->knots,
+                          w->n_knots, w->coefficients, w->radius_at, w->hole_radius, w->n_radius, w->friction_at,
+                          w->friction, w->n_friction, w->p, w->data, w->width, w->found);
+    return w->found[1] == 0 && w->found[2] > 0.0 && w->found[3] < w->knots[w->n_knots - 1];
+}
+
+/* Whether the wall may act on any point of the state that was looked at last */
+static int touches(const struct wall *w, int size, int block, const double *u)
+{
+    double reach = w->reach;
+    if (w->always)
+        return 1;
+    if (w->retardation != 0.0) {
+        double fastest = 0.0;
+        for (int i = 0; i < size; i += block)
+            for (int k = w->speed; k < w->speed + 3 && k < block; k++)
+                if (!(fabs(u[i + k]) <= fastest))
+                    fastest = fabs(u[i + k]);
+        reach += w->retardation * fastest * 2;
+    }
+    return !(w->found[0] > reach);
+}
+
+enum { CONVERGED = 1, SLOW, NOT_A_NUMBER, OUTSIDE, NOT_LOCAL };
+
+int newton(struct newton *s, double a, double b, int with_rate, int with_known, int keep, int most, double slow,
+           double stalled, int patience)
+{
+    const int size = s->size, block = s->block;
+    double previous = INFINITY;
+    int renew_after = 0, first = 1, outcome = SLOW;
+    memcpy(s->trusted, s->x, size * sizeof(double));
+    for (int iteration = 0; iteration < most; iteration++) {
+        stage(size, s->x, s->x0, a, b, with_rate ? s->rate : NULL, s->u, s->u_dot);
+        if (s->wall && !look(s->wall, size, block, s->u))
+            return OUTSIDE;
+        const int near = s->touching = s->wall && touches(s->wall, size, block, s->u);
+        assemble_vector(near ? s->near : s->off, s->f, size, NULL, 0);
+        for (int k = 0; k < s->n_held; k++) {
+            const int row = s->held[k];
+            s->reaction[k] = s->f[row];
+            s->f[row] = s->u[row] - s->target[k];
+        }
+        if (a != 1.0)
+            for (int i = 0; i < size; i++)
+                s->f[i] *= 1 / a;
+        if (with_known)
+            for (int i = 0; i < size; i++)
+                s->f[i] -= s->known[i];
+        const double shift = b / a;
+        if (iteration == 0 && fabs(shift - s->factored) > 1e-10 * shift)
+            s->renew = 1;
+        const int fresh = s->renew || !keep;
+        if (fresh) {
+            *s->shift = shift;
+            if (factorise(s->solver, s->jacobian))
+                return NOT_LOCAL;
+            s->factored = shift;
+            s->renew = 0;
+            s->factorisations++;
+            s->contraction = 1.0;
+        }
+        solve(s->solver, s->f, s->y);
+        double worst = 0.0;
+        for (int i = 0; i < size; i += block)
+            for (int k = 0; k < block; k++) {
+                s->x[i + k] -= s->y[i + k];
+                const double change = fabs(s->y[i + k]) * s->unit[k];
+                if (!(change <= worst)) /* also catches nan */
+                    worst = change;
+            }
+        s->iterations++;
+        if (!isfinite(worst)) {
+            outcome = NOT_A_NUMBER;
+            break;
+        }
+        if (!first) {
+            if (worst > 1.0) {
+                s->contraction = worst / previous;
+                if (!fresh && s->contraction > stalled) {
+                    memcpy(s->x, s->trusted, size * sizeof(double));
+                    keep = 0;
+                    first = 1;
+                    continue;
+                }
+                s->renew = s->contraction > stalled || worst * pow(s->contraction, patience) > 1.0;
+                renew_after = renew_after || s->contraction > slow;
+            } else if (worst / previous < s->contraction)
+                s->contraction = worst / previous;
+        }
+        if (worst < 1.0) {
+            outcome = CONVERGED;
+            break;
+        }
+        if (fresh || !first)
+            memcpy(s->trusted, s->x, size * sizeof(double));
+        previous = worst;
+        first = 0;
+    }
+    s->renew = s->renew || renew_after;
+    return outcome;
 }

@@ -11,10 +11,10 @@ import importlib.util
 import logging
 import sysconfig
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cffi
 import dolfinx
@@ -25,9 +25,16 @@ import ufl
 from ..compat import Array, compile_form, jit_options
 from ..models.rod import Rod
 from .lanes import DECLARATIONS, kernel_names, with_lanes
+from .newton import DRAGGING, MAX_ITERATIONS, PATIENCE, STALLED, TOLERANCE, BitCoupledNewton, Outcome
+
+if TYPE_CHECKING:
+    from .compiled import CompiledSystem
 
 log = logging.getLogger("drillfem")
 I4 = npt.NDArray[np.int32]
+_REACHES = "the kinematic rows of this rod reach beyond their nodes: use time.engine = 'petsc'"
+#: Answers of `newton` in native.c that are no Outcome.
+_OUTSIDE, _NOT_LOCAL = 4, 5
 _SOURCE = Path(__file__).with_name("native.c")
 
 
@@ -287,7 +294,7 @@ class NativeSolver(_Form):
     def factorise(self) -> None:
         """Assemble and factorise the Jacobian at the present values of its coefficients."""
         if self._lib.factorise(self.s, self.c):
-            raise ValueError("the kinematic rows of this rod reach beyond their nodes: use time.engine = 'petsc'")
+            raise ValueError(_REACHES)
         self.s.check = 0
 
     def solve(self, b: Array) -> Array:
@@ -311,3 +318,84 @@ class NativeStage:
     def __call__(self, a: float, b: float, with_rate: bool) -> None:
         rate = self._rate if with_rate else self._null
         self._stage(self._size, self._x, self._x0, a, b, rate, self._u, self._u_dot)
+
+
+class NativeNewton:
+    """All iterations of a stage of a step in C, of a rod without rock whose hole does not bend.
+
+    The arrays of ``system`` are kept, read and written; so are those of the rod.
+    """
+
+    def __init__(self, system: CompiledSystem, solver: NativeSolver, rod: Rod) -> None:
+        native = library()
+        self._lib, self._rod = native.lib, rod
+        ffi = native.ffi
+        self._keep: list[Any] = [system, solver]
+
+        def pointer(array: Any, kind: str = "double *") -> Any:
+            self._keep.append(array)
+            return ffi.cast(kind, array.ctypes.data)
+
+        c = self._c = ffi.new("struct newton *")
+        near, off = rod.residual_forms
+        c.near, c.off, c.jacobian, c.solver = near.c, off.c, solver.c, solver.s  # type: ignore[attr-defined]
+        c.size, c.block, c.n_held = rod.size, rod.ansatz.size, len(rod.constrained)
+        c.x, c.x0, c.rate, c.known = map(pointer, (system.x, system.x0, system.rate, system.known))
+        c.u, c.u_dot = pointer(rod.u.x.array), pointer(rod.u_dot.x.array)
+        c.f, c.trusted, c.y = pointer(system.f), pointer(system.trusted), pointer(np.zeros(rod.size))
+        c.held, c.target, c.reaction = (
+            pointer(rod.constrained, "int32_t *"),
+            pointer(rod.imposed),
+            pointer(rod.reaction),
+        )
+        names = rod.ansatz.x_names + rod.ansatz.v_names
+        c.unit = pointer(np.array([1.0 / TOLERANCE[name[0]] for name in names]))
+        c.shift = pointer(rod.shift.value)
+        self._wall = self._wall_of(rod, pointer) if rod.wall is not None else ffi.NULL
+        c.wall = self._wall
+
+    @staticmethod
+    def _wall_of(rod: Rod, pointer: Callable[..., Any]) -> Any:
+        # compiled when it is imported
+        from ..boreholes.search import search
+
+        wall, contact = rod.wall, rod.scene.contact
+        assert wall is not None and contact is not None
+        w = library().ffi.new("struct wall *")
+        w.search = search.address
+        w.n_axes, w.speed = len(wall.axes), rod.ansatz.index("v1") if "v1" in rod.ansatz.v_names else 0
+        w.axes[0 : w.n_axes] = wall.axes
+        w.r = pointer(np.zeros((len(rod.nodes), 3)))
+        w.cells = pointer(wall.cells, "int32_t *")
+        (w.n_cells, w.per_cell), w.n_points, w.width = wall.cells.shape, len(wall.basis), wall.data.shape[1]
+        w.basis, w.radius, w.p, w.data = map(pointer, (wall.basis, wall.radius, wall.p, wall.data))
+        table = wall.hole.table
+        w.knots, w.coefficients, w.radius_at = map(pointer, (table.knots, table.coefficients, table.radius_at))
+        w.hole_radius, w.friction_at, w.friction = map(pointer, (table.radius, table.friction_at, table.friction))
+        w.n_knots, w.n_radius, w.n_friction = len(table.knots), len(table.radius), len(table.friction)
+        w.reach, w.retardation = rod.wall_reach, wall.retardation
+        w.always = contact.normal_force == "weight"
+        return w
+
+    def __call__(self, newton: BitCoupledNewton, a: float, b: float, rate: bool, known: bool) -> Outcome | None:
+        """The stage u = x0 + a (x - x0), u-dot = b (x - x0) + rate; None where the string leaves the hole that is
+        known, which the iterations in Python look into."""
+        c, wall = self._c, self._rod.wall
+        c.renew, c.contraction, c.factored = newton.renew, newton.contraction, newton.factored_shift
+        c.iterations, c.factorisations = newton.iterations, newton.factorisations
+        found = self._lib.newton(c, a, b, rate, known, newton.keep, MAX_ITERATIONS, DRAGGING, STALLED, PATIENCE)
+        if found == _NOT_LOCAL:
+            raise ValueError(_REACHES)
+        newton.renew, newton.contraction, newton.factored_shift = bool(c.renew), c.contraction, c.factored
+        newton.iterations, newton.factorisations = c.iterations, c.factorisations
+        self._rod.near_wall = bool(c.touching)
+        if wall is not None:
+            wall.gap, wall.trouble = self._wall.found[0], ""
+        if found == _OUTSIDE:
+            self._trusted_back()
+            return None
+        return Outcome(found)
+
+    def _trusted_back(self) -> None:
+        system = self._keep[0]
+        system.x[:] = system.trusted

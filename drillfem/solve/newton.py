@@ -26,12 +26,12 @@ from ..forms.ansatz import Spatial
 from ..models.rod import Rod
 
 #: Update below which an iteration has converged, in the unit of each component (m, 1, rad, m/s, rad/s).
-_TOLERANCE = {"r": 1e-9, "q": 1e-10, "t": 1e-10, "p": 1e-10, "v": 1e-8, "w": 1e-8, "h": 1e-9}
-_MAX_ITERATIONS = 25
+TOLERANCE = {"r": 1e-9, "q": 1e-10, "t": 1e-10, "p": 1e-10, "v": 1e-8, "w": 1e-8, "h": 1e-9}
+MAX_ITERATIONS = 25
 #: contraction above which the kept Jacobian is renewed for the next solve, and at once
-_SLOW, _STALLED = 0.1, 0.5
+DRAGGING, STALLED = 0.1, 0.5
 #: iterations that a kept Jacobian may still need
-_PATIENCE = 5
+PATIENCE = 5
 #: how often the multipliers of an augmented Lagrangian are moved in one solve
 _MOST_UPDATES = 50
 
@@ -62,6 +62,10 @@ class System(Protocol):
 
     def residual(self) -> Array:
         """F at the present x, shape (dofs,): a view, which may be overwritten. The rod takes the state of the stage."""
+        ...
+
+    def iterate(self, newton: BitCoupledNewton) -> Outcome | None:
+        """All iterations of a rod without rock at once; None where the system cannot, and has changed nothing."""
         ...
 
     def settle(self) -> None:
@@ -209,14 +213,14 @@ class BitCoupledNewton:
         #: where the bit was at the last accepted step
         self.start_rotation: Any = 0.0
         self.start_depth = 0.0
-        self._factored_shift = 0.0
-        self._renew = True
-        self._contraction = 1.0
+        self.factored_shift = 0.0
+        self.renew = True
+        self.contraction = 1.0
         #: where the angular velocity stands in a node's block, of an ansatz that turns (else 0)
         self._turning = rod.ansatz.index("w1") if keep and isinstance(rod.ansatz, Spatial) else 0
         self._stage, self._load = rod.u.x.array, rod.bit_load
         names = rod.ansatz.x_names + rod.ansatz.v_names
-        self._unit = np.array([1.0 / _TOLERANCE[name[0]] for name in names])
+        self.unit = np.array([1.0 / TOLERANCE[name[0]] for name in names])
         n = rod.size // rod.ansatz.size
         self._cosine, self._sine = np.ones(n), np.zeros(n)
         self._reference = np.zeros((n, 4))
@@ -232,7 +236,7 @@ class BitCoupledNewton:
 
     def forget(self) -> None:
         """Start afresh, as after a restart: no kept Jacobian, no extrapolation."""
-        self._renew = True
+        self.renew = True
         self._history.clear()
 
     def _quaternions(self) -> Array:
@@ -246,8 +250,8 @@ class BitCoupledNewton:
 
     def _factorise(self, system: System) -> None:
         system.factorise()
-        self._factored_shift = system.shift()
-        self._renew = False
+        self.factored_shift = system.shift()
+        self.renew = False
         self.factorisations += 1
         if self._turning:
             self._reference[:] = self._quaternions()
@@ -318,19 +322,21 @@ class BitCoupledNewton:
         return outcome
 
     def _iterate(self, system: System, x: Array) -> Outcome:
+        if self.bit is None and not self._turning and (done := system.iterate(self)) is not None:
+            return done
         rod, bit = self.rod, self.bit
         outcome = Outcome.SLOW
         previous, renew_after, keep = np.inf, False, self.keep
         # where to go back to when a kept Jacobian leads astray: behind the last update that can be trusted
         trusted, trusted_load, first = x.copy(), self._load.copy(), True
-        for iteration in range(_MAX_ITERATIONS):
+        for iteration in range(MAX_ITERATIONS):
             f = system.residual()
-            if iteration == 0 and abs(system.shift() - self._factored_shift) > 1e-10 * system.shift():
-                self._renew = True
-            fresh = self._renew or not keep
+            if iteration == 0 and abs(system.shift() - self.factored_shift) > 1e-10 * system.shift():
+                self.renew = True
+            fresh = self.renew or not keep
             if fresh:
                 self._factorise(system)
-                self._contraction = 1.0
+                self.contraction = 1.0
             elif self._turning and iteration == 0:
                 _turns(self._reference, self._quaternions(), self._cosine, self._sine)
             y = self._solve_kept(system, f)
@@ -340,7 +346,7 @@ class BitCoupledNewton:
                 d_weight, d_torque = self._condense(y, part)
                 loads = (d_weight / part, d_torque / part)
                 rod.set_bit_load(self._load[0] + d_weight, self._load[1] + d_torque)
-            size = _update(x, y, self._columns, loads, self._turning, self._cosine, self._sine, self._unit)
+            size = _update(x, y, self._columns, loads, self._turning, self._cosine, self._sine, self.unit)
             self.iterations += 1
             if not math.isfinite(size):
                 outcome = Outcome.NAN
@@ -348,24 +354,24 @@ class BitCoupledNewton:
             if not first:
                 # below the tolerance it is round-off that is seen
                 if size > 1.0:
-                    self._contraction = size / previous
-                    if not fresh and self._contraction > _STALLED:
+                    self.contraction = size / previous
+                    if not fresh and self.contraction > STALLED:
                         x[:] = trusted
                         rod.set_bit_load(*trusted_load)
                         keep, first = False, True
                         continue
                     # or when it would take too many more iterations
-                    self._renew = self._contraction > _STALLED or size * self._contraction**_PATIENCE > 1.0
-                    renew_after = renew_after or self._contraction > _SLOW
+                    self.renew = self.contraction > STALLED or size * self.contraction**PATIENCE > 1.0
+                    renew_after = renew_after or self.contraction > DRAGGING
                 else:
-                    self._contraction = min(self._contraction, size / previous)
+                    self.contraction = min(self.contraction, size / previous)
             # what is left after this update is contraction/(1 - contraction) of it. The Jacobian of a drilling string
             # turns with it and contracts as it did in the last solve, with a margin; that of another rod goes stale
             # with every step, and its contraction tells of the fast components only
             if bit is None:
                 rate = 1.0
             else:
-                rate = min(1.0, 4 * self._contraction) if first else self._contraction
+                rate = min(1.0, 4 * self.contraction) if first else self.contraction
             if size < 1.0 or (rate < 0.5 and size * rate / (1 - rate) < 1.0):
                 outcome = Outcome.CONVERGED
                 # reactions and powers are read from the state that the rod has seen last
@@ -375,5 +381,5 @@ class BitCoupledNewton:
             if fresh or not first:
                 trusted[:], trusted_load[:] = x, self._load
             previous, first = size, False
-        self._renew = self._renew or renew_after
+        self.renew = self.renew or renew_after
         return outcome

@@ -86,6 +86,9 @@ def simulate(
 
     Raises SceneError (bad input; nothing is written) and SimulationError (what was computed is kept in ``out``).
     """
+    if warn and scene.random:
+        means = ", ".join(f"{r.target} {r.centre:g}" for r in scene.random)
+        log.info(f"random inputs at their means: {means}")
     return _run(scene, None if out is None else Path(out), until, progress, resume=False, warn=warn)
 
 

@@ -28,6 +28,8 @@ _HELD = {
     "clamped": ("r1", "r2", "r3", "theta", "phi", "q_a", "q_b", "q_c", "q_d"),
     "hung": ("r1", "r2", "r3", "theta", "phi", "q_a", "q_b", "q_c", "q_d"),
     "driven": ("r1", "r2", "r3", "theta", "phi", "q_a", "q_b", "q_c", "q_d"),
+    # held where it is, or nothing would balance what pushes it
+    "sliding": ("r1", "r2", "r3", "theta", "phi", "q_a", "q_b", "q_c", "q_d"),
     "guided": ("r1", "r2"),
     "bit": ("r1", "r2"),
 }
@@ -70,7 +72,7 @@ class Statics:
     def terms(self) -> vw.Terms:
         """The terms of equilibrium, by name: without motion there is neither inertia nor damping nor friction."""
         rod, test, a = self.rod, ufl.TestFunction(self.V), self.rod.ansatz.bare
-        support = self.support if rod.bends else None
+        support = self.support if rod.bends or a.name == "planar" else None
         terms = vw.static_terms(a, self.x, test, rod.s, rod.section, rod.loads, rod.on, rod.literal, support)
         return {k: v for k, v in terms.items() if k not in ("inertia", "damping", "friction")}
 

@@ -61,7 +61,7 @@ def test_every_variation_is_a_valid_scene(case):
 
 
 def test_cases_are_found_by_name_or_scene():
-    usual = ["4-contact", "4-startup", "V1", "V2", "C1", "C2", "C3", "6-V1", "6-C1", "6-C2-stages", "B-4"]
+    usual = ["4-contact", "4-startup", "V1", "V2", "C1", "C2", "C3", "6-V1", "6-C1", "6-C2-stages", "7", "B-4"]
     assert [case.name for case in find_cases([])] == usual
     # what takes half an hour is asked for
     assert [case.name for case in find_cases(["curved-c2"])] == ["6-C2"]

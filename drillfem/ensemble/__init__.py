@@ -1,0 +1,1 @@
+"""Random fields and inputs, samples of them, and what runs and judges an ensemble."""
