@@ -56,7 +56,8 @@ def main(arguments: list[str] | None = None) -> int:
         message, code = _explain(error)
     except KeyboardInterrupt:
         message, code = "interrupted", 130
-    stderr.print(message, markup=False, soft_wrap=True)
+    if code != 2 or _rank() == "0":  # bad input is bad on all ranks
+        stderr.print(message, markup=False, soft_wrap=True)
     return code
 
 
@@ -231,6 +232,101 @@ def sweep(
         run_sweep(scene, axes, out, _overrides(set_), _seconds(until), jobs, tell)
     except KeyboardInterrupt as error:
         raise _StoppedError(str(error) or "interrupted", 130) from error
+
+
+@app.command()
+def ensemble(
+    scene: SceneName,
+    count: Annotated[int, typer.Option("-n", "--members", metavar="N", help="How many members there shall be.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the ensemble; a part of it is completed.")],
+    seed: Annotated[int, typer.Option(metavar="S", help="Seed of all random numbers.")] = 0,
+    method: Annotated[str, typer.Option(metavar="NAME", help="monte-carlo, sobol or latin-hypercube.")] = "monte-carlo",
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the scene.")
+    ] = None,
+    until: Until = None,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Keep this history, or random field, of every member; may be repeated."),
+    ] = None,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed members again.")] = False,
+    tolerance: Annotated[
+        str | None, typer.Option(metavar="X", help="Stop when the mean is known so well: 0.01 or 1%.")
+    ] = None,
+    quantity: Annotated[str | None, typer.Option(metavar="NAME", help="The mean of what: power_ratio ...")] = None,
+) -> None:
+    """Simulate many members of a scene with random inputs; under mpirun or srun on all ranks."""
+    from drillfem.ensemble.command import main as run_ensemble
+
+    try:
+        run_ensemble(
+            *(scene, count, out, seed, method, _overrides(set_), _seconds(until), keep or [], retry_failed),
+            *(tolerance, quantity),
+        )
+    except KeyboardInterrupt as error:
+        raise _StoppedError(str(error) or "interrupted", 130) from error
+
+
+@app.command()
+def statistics(
+    folders: Annotated[
+        list[Path], typer.Argument(metavar="DIR...", help="An ensemble; more of other seeds: their mean has an error.")
+    ],
+    quantity: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Of a member's summary; may be repeated.")
+    ] = None,
+) -> None:
+    """Mean, deviation, quantiles and density of an ensemble, each with its error; pictures into its folder."""
+    from drillfem.ensemble.analysis import statistics as tell
+
+    tell(folders, quantity or [])
+
+
+@app.command()
+def multilevel(
+    scene: SceneName,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="New folder for picture and numbers.")],
+    quantity: Annotated[str | None, typer.Option(metavar="NAME", help="Of a member's summary.")] = None,
+    levels: Annotated[int, typer.Option(metavar="N", help="The scene is the finest of them.")] = 4,
+    refine: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KEY", help="What is refined: mesh.elements and time.step by default; may be repeated."),
+    ] = None,
+    pilot: Annotated[int, typer.Option(metavar="N", help="Pairs per level, to begin with.")] = 40,
+    tolerance: Annotated[
+        str | None, typer.Option(metavar="X", help="Go on to this relative error of the mean: 0.05 or 5%.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of the members.")] = 0,
+    jobs: Annotated[int, typer.Option(metavar="N", help="Members at a time, in processes of their own.")] = 1,
+    set_: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key.")] = None,
+) -> None:
+    """Say from slopes over mesh and step whether multilevel Monte Carlo pays for a random scene, and use it."""
+    from drillfem.ensemble.analysis import multilevel as run_levels
+    from drillfem.ensemble.analysis import share
+    from drillfem.scene import load_scene
+
+    loaded = load_scene(scene, _overrides(set_))
+    run_levels(loaded, out, levels, pilot, share(tolerance), quantity, refine or (), seed, jobs)
+
+
+@app.command()
+def sensitivity(
+    scene: SceneName,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="New folder for picture and numbers.")],
+    quantity: Annotated[str | None, typer.Option(metavar="NAME", help="Of a member's summary.")] = None,
+    count: Annotated[
+        int, typer.Option("-n", metavar="N", help="Base points; there are N x (inputs + 2) members.")
+    ] = 64,
+    terms: Annotated[bool, typer.Option("--terms", help="Of every term of a field, not of the field.")] = False,
+    seed: Annotated[int, typer.Option(help="Of the members.")] = 0,
+    jobs: Annotated[int, typer.Option(metavar="N", help="Members at a time, in processes of their own.")] = 1,
+    set_: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key.")] = None,
+) -> None:
+    """Which random input an answer depends on: first-order and total Sobol' indices."""
+    from drillfem.ensemble.analysis import sensitivity as find_indices
+    from drillfem.scene import load_scene
+
+    find_indices(load_scene(scene, _overrides(set_)), out, count, quantity, terms, seed, jobs)
 
 
 @app.command()
@@ -493,6 +589,12 @@ def _version() -> str:
     return getattr(drillfem, "__version__", "0")
 
 
+def _rank() -> str:
+    """Rank of this process among those of mpirun or srun, before MPI is there to ask."""
+    names = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "SLURM_PROCID")
+    return next((os.environ[name] for name in names if os.environ.get(name)), "0")
+
+
 def _log_to(console: Console) -> None:
     """Show what the package logs, on the first MPI rank only."""
 
@@ -501,8 +603,7 @@ def _log_to(console: Console) -> None:
             console.print(self.format(record), markup=False, soft_wrap=True)
 
     logger = logging.getLogger("drillfem")
-    rank = os.environ.get("OMPI_COMM_WORLD_RANK") or os.environ.get("PMI_RANK") or "0"
-    logger.handlers = [Handler()] if rank == "0" else [logging.NullHandler()]
+    logger.handlers = [Handler()] if _rank() == "0" else [logging.NullHandler()]
     logger.setLevel(logging.DEBUG if os.environ.get("DRILLFEM_DEBUG") else logging.INFO)
     logger.propagate = False
 

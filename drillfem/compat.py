@@ -18,7 +18,9 @@ import numpy.typing as npt
 from .errors import MissingDependency
 
 try:
+    # isort: split
     import petsc4py
+    from mpi4py import MPI  # first: it asks MPI for threads, PETSc does not
 
     # signals are the program's: Ctrl-C keeps what was computed, a closed pipe is no crash
     petsc4py.init(["drillfem", "-no_signal_handler"])
@@ -26,7 +28,6 @@ try:
     import dolfinx
     import dolfinx.fem.petsc
     import ufl
-    from mpi4py import MPI
     from petsc4py import PETSc
 except ImportError as error:
     raise MissingDependency(

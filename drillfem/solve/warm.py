@@ -21,6 +21,8 @@ _RUNS: tuple[tuple[str, dict[str, object], float | None], ...] = (
     ("pendulum", {}, 0.01),
     ("roll-up", {}, None),
     ("bend-45", {}, None),
+    ("horizontal-a", {}, 0.01),
+    ("horizontal-b", {}, 0.01),
 )
 
 
