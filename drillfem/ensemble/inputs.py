@@ -27,6 +27,7 @@ import numpy.typing as npt
 from drillfem.ensemble.fields import F8, KarhunenLoeve, Modes, covariance, exact_modes, galerkin_modes
 from drillfem.errors import SceneError
 from drillfem.scene import Scene
+from drillfem.scene.ladder import gain
 from drillfem.scene.uncertain import FIELDS, Random, number_at, value_at, with_value
 
 STATIC, DYNAMIC = FIELDS["contact.friction"]
@@ -210,6 +211,4 @@ def reach(scene: Scene) -> float:
     It gains what its block speed, or steady drilling, takes it. How far a string slides that is pushed by a force is
     not known beforehand: a field on such a hole ends with the string, and goes on as it ends.
     """
-    duration = scene.time.end - scene.time.start
-    gain = max(abs(scene.top_drive.block_speed or 0.0), scene.nominal().rate_of_penetration)
-    return scene.length + 2 * duration * (gain if math.isfinite(gain) else 0.0)
+    return scene.length + 2 * gain(scene)

@@ -346,6 +346,37 @@ def test_a_free_bit_turns_in_a_curved_hole_under_pi() -> None:
     assert result.summary["energy_balance_error"] < 1e-3
 
 
+def test_a_hung_string_is_lowered_into_the_curve() -> None:
+    """From the vertical part into a bend, turning: it lies on the wall, and the hook carries what the hole does not."""
+    found = scene(
+        {"kind": "imposed-speed", "speed": 6.0, "block_speed": 0.5},
+        80.0,
+        model="auto",
+        hole={"kind": "build", "kick_off": 82.0, "radius": 60.0, "final_inclination": np.pi / 2},
+        contact={"stiffness": 1e6, "friction_static": 0.0, "friction_dynamic": 0.0},
+        material={"retardation_time": 1e-3},
+        ends={"top_inertia": 0.0},
+        mesh={"elements": 16},
+        time={"end": 80.0, "step": 0.01},
+        output={"interval": 0.5, "fields_interval": 80.0},
+    )
+    assert found.resolved_model().name == "spatial"  # the rungs know that it will bend
+    result = drillfem.simulate(found, warn=False)
+    h, hole = result.history, found.borehole
+    assert hole is not None and result.fields is not None
+    last = result.fields.isel(time=-1)
+    # the lower end is 40 m farther down the hole, on its wall
+    reached = float(hole.nearest(last["position"].values[-1:])[0])
+    assert reached == pytest.approx(120.0, abs=0.1)
+    assert float(last["wall_gap"].min()) == pytest.approx(0.0, abs=5e-3)
+    # without friction the hook carries the weight of the depth that the string hangs through (and its bending)
+    weight = found.weight / found.length
+    depth = float(last["position"].values[-1, 2]) - 40.0
+    carried = float(h["hook_load"].values[-40:].mean())
+    assert carried == pytest.approx(weight * depth, rel=0.02)
+    assert carried < 0.98 * found.weight
+
+
 def test_steps_alone_renew_the_reference() -> None:
     """A stepper without a run around it counts the turns too."""
     s = scene(PI, length=10.0, mesh={"elements": 1})

@@ -29,6 +29,7 @@ from drillfem.scene.ladder import (
     critical_weight,
     distance,
     findings,
+    gain,
     giver,
     growing_motions,
     hole_rule,
@@ -124,10 +125,14 @@ def test_an_inclined_straight_hole_loads_the_string_from_the_side() -> None:
     assert load.numbers["side_load"] == pytest.approx(scene.string[1].mass_per_length * 9.80665 * math.sin(0.2))
 
 
+#: string, and what it drills in 200 s
+REACH = 1200 + 200 * load_scene("vertical-c1-cd4").nominal().rate_of_penetration
+
+
 @pytest.mark.parametrize(
     "hole, curvature, turn, inclination",
     [
-        (Hole("arc", 0.3, radius=2000.0), 1 / 2000, 1200 / 2000, 1200 / 2000),
+        (Hole("arc", 0.3, radius=2000.0), 1 / 2000, REACH / 2000, REACH / 2000),
         (Hole("build", 0.3, kick_off=300.0, radius=573.0, final_inclination=0.5), 1 / 573, 0.5, 0.5),
         # radius 100 m, 300 m down per turn: curvature r/(r^2 + (pitch/2 pi)^2)
         (Hole("helix", 0.3, radius=100.0, pitch=300.0), 100 / (100**2 + (150 / math.pi) ** 2), None, None),
@@ -140,7 +145,8 @@ def test_a_hole_is_what_its_geometry_is(
     bend = bend_of(scene)
     assert bend is not None
     assert bend.curvature == pytest.approx(curvature, rel=1e-6)
-    assert bend.turn == pytest.approx(turn or 1200 * curvature, rel=1e-3)
+    assert gain(scene) == pytest.approx(REACH - 1200, rel=1e-6)
+    assert bend.turn == pytest.approx(turn or REACH * curvature, rel=1e-3)
     expected = math.atan(2 * math.pi * 100 / 300) if inclination is None else inclination
     assert inclination_of(scene) == pytest.approx(expected, rel=1e-6)
     assert lowest(scene).name == "spatial"
