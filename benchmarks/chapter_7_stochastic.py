@@ -1,13 +1,14 @@
 """Chapter 7 with random friction: density of the power ratio, convergence, realisations (figures 7.4 and 7.5).
 
-    python benchmarks/chapter_7_stochastic.py [FOLDER]
+    python benchmarks/chapter_7_stochastic.py [A B]
 
-FOLDER: an ensemble of horizontal-stochastic with `--keep bit_depth`, as
+A: an ensemble of horizontal-stochastic with `--keep bit_depth`, B: 1000 members of the same fields with the weight as
+normal force, as these make them; else they are made here, on one process (an hour and a half):
 
-    mpirun -n 2 drillfem ensemble horizontal-stochastic -n 10000 --seed 2023 --keep bit_depth --out FOLDER
+    mpirun -n 2 drillfem ensemble horizontal-stochastic -n 10000 --seed 2023 --keep bit_depth --out A
+    mpirun -n 2 drillfem ensemble horizontal-stochastic -n 1000 --seed 2023 --set contact.normal_force=weight --out B
 
-makes it; else one is made here, on one process (an hour and a half). Beside it 1000 members of the same fields with
-the weight as normal force. Writes docs/chapter-7-stochastic.md and docs/img/chapter-7-stochastic-*.png.
+Writes docs/chapter-7-stochastic.md and docs/img/chapter-7-stochastic-*.png.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 from common import DOCS, table
 
 from drillfem.ensemble import drawing
@@ -31,13 +31,6 @@ SCENE, SEED, MEMBERS, BESIDE = "horizontal-stochastic", 2023, 10_000, 1000
 QUANTITIES = ("power_ratio", "drilled_depth")
 WEIGHT = {"contact.normal_force": "weight"}
 STEMS = {"power_ratio": "power", "drilled_depth": "depth"}
-
-
-def beside(folder: Path) -> xr.Dataset:
-    """Case B with the same fields: member i of the same seed has the same friction."""
-    found = ensemble(SCENE, BESIDE, folder, seed=SEED, overrides=WEIGHT)
-    assert found is not None
-    return found
 
 
 def draw_beside(path: Path, a: Statistics, b: Statistics) -> None:
@@ -78,14 +71,14 @@ def share(found: Statistics, above: float) -> str:
 def main() -> None:
     images = DOCS / "img"
     with tempfile.TemporaryDirectory() as scratch:
-        if len(sys.argv) > 1:
-            folder = Path(sys.argv[1])
+        if len(sys.argv) > 2:
+            folder, weighed = Path(sys.argv[1]), Path(sys.argv[2])
         else:
-            folder = Path(scratch) / "a"
+            folder, weighed = Path(scratch) / "a", Path(scratch) / "b"
             ensemble(SCENE, MEMBERS, folder, seed=SEED, keep=["bit_depth"])
-        data = read(folder)
-        other = beside(Path(scratch) / "b")
-    sessions = json.loads((folder / "ensemble.json").read_text())["sessions"]
+            ensemble(SCENE, BESIDE, weighed, seed=SEED, overrides=WEIGHT)
+        data, other = read(folder), read(weighed)
+        sessions = json.loads((folder / "ensemble.json").read_text())["sessions"]
     a = {name: of(data, name) for name in QUANTITIES}
     b = {name: of(other, name) for name in QUANTITIES}
     for name, found in a.items():
