@@ -6,7 +6,8 @@ A: an ensemble of horizontal-stochastic with `--keep bit_depth`, B: 1000 members
 normal force, as these make them; else they are made here, on one process (an hour and a half):
 
     mpirun -n 2 drillfem ensemble horizontal-stochastic -n 10000 --seed 2023 --keep bit_depth --out A
-    mpirun -n 2 drillfem ensemble horizontal-stochastic -n 1000 --seed 2023 --set contact.normal_force=weight --out B
+    mpirun -n 2 drillfem ensemble horizontal-stochastic -n 1000 --seed 2023 --out B \
+        --set contact.normal_force=weight --set contact.retardation_time=0
 
 Writes docs/chapter-7-stochastic.md and docs/img/chapter-7-stochastic-*.png.
 """
@@ -29,7 +30,7 @@ from drillfem.render import style
 
 SCENE, SEED, MEMBERS, BESIDE = "horizontal-stochastic", 2023, 10_000, 1000
 QUANTITIES = ("power_ratio", "drilled_depth")
-WEIGHT = {"contact.normal_force": "weight"}
+WEIGHT = {"contact.normal_force": "weight", "contact.retardation_time": 0.0}
 STEMS = {"power_ratio": "power", "drilled_depth": "depth"}
 
 
@@ -55,11 +56,11 @@ def numbers(found: Statistics) -> list[str]:
     def said(x: float) -> str:
         return f"{scale * x:.{digits}g}"
 
-    cells = [f"{said(found.mean.value)} ± {said(found.mean.error)}"]
+    cells = [f"{said(found.mean.value)} ± {scale * found.mean.error:.2g}"]
     deviation = found.standard_deviation
     cells.append(f"{said(deviation.value)} ({said(deviation.low)} to {said(deviation.high)})")
     cells += [f"{said(q.value)} ({said(q.low)} to {said(q.high)})" for q in found.quantiles.values()]
-    bandwidth = "" if found.density is None else said(found.density.bandwidth)
+    bandwidth = "" if found.density is None else f"{scale * found.density.bandwidth:.2g}"
     return [*cells, bandwidth, f"{len(found.values)}, {len(found.failed)} failed"]
 
 
