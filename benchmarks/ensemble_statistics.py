@@ -373,7 +373,8 @@ TEXT = """# Statistics of ensembles
 
 An ensemble says something about strings that were not run. How much it says is an error, and every number here has
 one. Numbers and pictures are written by `python benchmarks/ensemble_statistics.py`
-(a part of it: `intervals`, `sampling`, `multilevels`, `sensitivities`, `small_ensemble`).
+(a part of it: `intervals`, `sampling`, `multilevels`, `sensitivities`, `small_ensemble`). They speak of 10 000 members
+on [another page](chapter-7-stochastic.md).
 
 ```
 drillfem statistics DIR                                  # of the power ratio, or of the drilled depth

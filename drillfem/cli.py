@@ -256,12 +256,13 @@ def ensemble(
     quantity: Annotated[str | None, typer.Option(metavar="NAME", help="The mean of what: power_ratio ...")] = None,
 ) -> None:
     """Simulate many members of a scene with random inputs; under mpirun or srun on all ranks."""
+    from drillfem.ensemble.analysis import share
     from drillfem.ensemble.command import main as run_ensemble
 
     try:
         run_ensemble(
             *(scene, count, out, seed, method, _overrides(set_), _seconds(until), keep or [], retry_failed),
-            *(tolerance, quantity),
+            *(share(tolerance), quantity),
         )
     except KeyboardInterrupt as error:
         raise _StoppedError(str(error) or "interrupted", 130) from error
@@ -438,11 +439,8 @@ def warm_up() -> None:
     print(f"compiled in {time.perf_counter() - start:.0f} s")
 
 
-class ProgressDisplay:
-    """Progress of a run, to be called with (simulated time in s, its end in s, simulated seconds per second).
-
-    A bar on a terminal; elsewhere a line every ten seconds at most.
-    """
+class LiveLine:
+    """How far something is: a bar on a terminal; elsewhere a line every ten seconds at most."""
 
     def __init__(self, console: Console | None = None) -> None:
         self._console = console or stderr
@@ -464,19 +462,29 @@ class ProgressDisplay:
         if self._bar is not None:
             self._bar.stop()
 
-    def __call__(self, t: float, end: float, speed: float) -> None:
-        """Show that the run is at ``t`` of ``end`` (s), at ``speed`` simulated seconds per second."""
-        now = time.perf_counter()
-        if now - self._shown < (PLAIN_INTERVAL if self._bar is None else 0.1):
-            return
-        self._shown = now
-        share = t / end if end > 0 else 0.0
-        left = f", {_clock((end - t) / speed)} left" if speed > 0 else ""
-        text = f"{t:.2f} of {end:g} s, {100 * share:.0f} %, {speed:.3g} simulated s per s{left}"
+    def due(self) -> bool:
+        """Whether it is time to say something again."""
+        return time.perf_counter() - self._shown >= (PLAIN_INTERVAL if self._bar is None else 0.1)
+
+    def say(self, share: float, text: str) -> None:
+        """Show that ``share`` of the whole is done, and the line ``text``."""
+        self._shown = time.perf_counter()
         if self._bar is not None:
             self._bar.update(self._task, completed=share, text=text, visible=True)
         else:
-            self._console.print(text, soft_wrap=True)
+            self._console.print(text, markup=False, soft_wrap=True)
+
+
+class ProgressDisplay(LiveLine):
+    """Progress of a run, to be called with (simulated time in s, its end in s, simulated seconds per second)."""
+
+    def __call__(self, t: float, end: float, speed: float) -> None:
+        """Show that the run is at ``t`` of ``end`` (s), at ``speed`` simulated seconds per second."""
+        if not self.due():
+            return
+        share = t / end if end > 0 else 0.0
+        left = f", {clock((end - t) / speed)} left" if speed > 0 else ""
+        self.say(share, f"{t:.2f} of {end:g} s, {100 * share:.0f} %, {speed:.3g} simulated s per s{left}")
 
 
 class _StoppedError(Exception):
@@ -577,7 +585,8 @@ def _window(text: str) -> tuple[float, float]:
     return _seconds(start, "--window") or 0.0, _seconds(end, "--window") or 0.0
 
 
-def _clock(seconds: float) -> str:
+def clock(seconds: float) -> str:
+    """``4:13`` or ``1:04:13``, of a time in s."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

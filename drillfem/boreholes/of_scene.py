@@ -22,10 +22,7 @@ def hole_of(scene: Scene) -> Borehole | None:
     hole, contact = scene.hole, scene.contact
     if hole.kind == "none" or hole.diameter is None:
         return None
-    duration = scene.time.end - scene.time.start
-    fastest = scene.nominal(weight=scene.weight).rate_of_penetration
-    advance = duration * max(abs(scene.top_drive.block_speed or 0.0), fastest)
-    reach, wide = 1.1 * (scene.length + 2 * advance) + 100.0, hole.diameter
+    reach, wide = 1.1 * (scene.length + 2 * scene.gain(weight=scene.weight)) + 100.0, hole.diameter
     radius = hole.radius or 0.0
     if hole.kind == "straight":
         made = straight(reach, hole.inclination, hole.azimuth, diameter=wide)

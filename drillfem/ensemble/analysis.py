@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -93,12 +93,7 @@ class _Local:
     def run(self, level: int, u: F8) -> tuple[float, float, str]:
         if level not in self.workers:
             # kernels are compiled before the clock starts
-            scene = self.inputs[level].member(np.full(self.inputs[level].dimension, 0.5)).scene
-            self.workers[level] = Worker(scene)
-            if self.workers[level]._rod is None:
-                from drillfem.solve import simulate
-
-                simulate(scene, until=scene.time.start + 2 * scene.time.step, warn=False)
+            self.workers[level] = Worker(self.inputs[level].middle)
         start = time.process_time()
         try:
             numbers = self.workers[level].run(self.inputs[level].member(u).scene)
@@ -278,7 +273,7 @@ def multilevel(
     print(f"verdict: {verdict}")
     out.mkdir(parents=True, exist_ok=True)
     facts: dict[str, Any] = {"quantity": name, "seed": seed, "tolerance": tolerance, "verdict": verdict}
-    write_json(out / "multilevel.json", _plain(facts | found.to_dict() | {"failures": members.reasons}))
+    write_json(out / "multilevel.json", facts | found.to_dict() | {"failures": members.reasons})
     (out / "scene.toml").write_text(scene.to_toml(), encoding="utf-8")
     print(drawing.levels(out / "multilevel.png", found, words(name), verdict))
     print(out / "multilevel.json")
@@ -343,7 +338,7 @@ def sensitivity(
     _print(rows + _reasons(members))
     out.mkdir(parents=True, exist_ok=True)
     facts = {"quantity": name, "seed": seed, "inputs": inputs.facts}
-    write_json(out / "sensitivity.json", _plain(facts | found.to_dict() | {"failures": members.reasons}))
+    write_json(out / "sensitivity.json", facts | found.to_dict() | {"failures": members.reasons})
     (out / "scene.toml").write_text(scene.to_toml(), encoding="utf-8")
     print(drawing.sensitivities(out / "sensitivity.png", found, name))
     print(out / "sensitivity.json")
@@ -354,15 +349,6 @@ def _reasons(members: Members) -> list[tuple[str, str]]:
     rows = [("failed" if k == 0 else "", reason) for k, reason in enumerate(members.reasons[:_NAMED])]
     more = len(members.reasons) - _NAMED
     return [*rows, *([("", f"and {more} more")] if more > 0 else [])]
-
-
-def _plain(data: Any) -> Any:
-    """Numbers that JSON has: what is not finite becomes None."""
-    if isinstance(data, Mapping):
-        return {k: _plain(v) for k, v in data.items()}
-    if isinstance(data, list | tuple):
-        return [_plain(v) for v in data]
-    return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
 def _print(rows: Sequence[tuple[str, str]]) -> None:

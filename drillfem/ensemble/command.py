@@ -6,57 +6,30 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING
 
 import numpy as np
-from rich.console import Console
 
+from drillfem.cli import LiveLine, clock
 from drillfem.errors import DrillfemError, SceneError, SimulationError
 
 if TYPE_CHECKING:
     import xarray as xr
-    from rich.progress import Progress
 
     from drillfem.ensemble.run import Standing
 
 
-class EnsembleProgress:
-    """Progress over all ranks, to be called with a `Standing`: a bar on a terminal, elsewhere a line now and then."""
-
-    def __init__(self, console: Console, interval: float) -> None:
-        """interval: seconds between two lines where there is no terminal."""
-        self._console, self._interval = console, interval
-        self._bar: Progress | None = None
-        self._task: Any = None
-        self._shown = time.perf_counter()
-
-    def __enter__(self) -> Self:
-        if self._console.is_terminal:
-            from rich.progress import BarColumn, Progress, TextColumn
-
-            text = TextColumn("{task.fields[text]}", markup=False)
-            self._bar = Progress(BarColumn(), text, console=self._console, transient=True)
-            self._task = self._bar.add_task("", total=1.0, text="", visible=False)
-            self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.stop()
+class EnsembleProgress(LiveLine):
+    """Progress over all ranks, to be called with a `Standing`."""
 
     def __call__(self, now: Standing) -> None:
         """Show how far it is."""
-        if self._bar is not None:
-            self._bar.update(self._task, total=now.count, completed=now.stored, text=progress_line(now), visible=True)
-        elif time.perf_counter() - self._shown > self._interval:
-            self._shown = time.perf_counter()
-            self._console.print(progress_line(now), markup=False, soft_wrap=True)
+        if self.due():
+            self.say(now.stored / now.count, progress_line(now))
 
 
 def progress_line(now: Standing) -> str:
     """``137 of 1000 members, 2 failed, 3.41 members/s on 2 ranks, 4:13 left``."""
-    from drillfem.cli import _clock
-
     text = f"{now.stored} of {now.count} members"
     if now.failed:
         text += f", {now.failed} failed"
@@ -64,7 +37,7 @@ def progress_line(now: Standing) -> str:
         pace = now.computed / now.seconds
         text += f", {pace:.3g} members/s on {now.ranks} rank{'s' * (now.ranks > 1)}"
         if now.count > now.stored:
-            text += f", {_clock((now.count - now.stored) / pace)} left"
+            text += f", {clock((now.count - now.stored) / pace)} left"
     return text
 
 
@@ -78,11 +51,10 @@ def main(
     until: float | None,
     keep: Sequence[str],
     retry_failed: bool,
-    tolerance: str | None,
+    tolerance: float | None,
     quantity: str | None,
 ) -> None:
     """The command ``drillfem ensemble``. Raises SceneError, SimulationError (no member is done), KeyboardInterrupt."""
-    from drillfem.cli import PLAIN_INTERVAL, stderr
     from drillfem.ensemble.run import ensemble, world
 
     comm = world()
@@ -91,7 +63,7 @@ def main(
         return
     start, ranks = time.perf_counter(), 1 if comm is None else comm.size
     latest: list[Standing] = []
-    with EnsembleProgress(stderr, PLAIN_INTERVAL) as progress:
+    with EnsembleProgress() as progress:
 
         def show(now: Standing) -> None:
             latest[:] = [now]
@@ -107,7 +79,7 @@ def main(
             until=until,
             keep=keep,
             retry_failed=retry_failed,
-            tolerance=None if tolerance is None else _share(tolerance),
+            tolerance=tolerance,
             quantity=quantity,
             show=show,
             comm=comm,
@@ -154,12 +126,3 @@ def _report(found: xr.Dataset, out: Path, quantity: str | None) -> None:
     print(f"results: {out / TABLE}")
     if not (status == DONE).any():
         raise SimulationError("no member could be computed")
-
-
-def _share(text: str) -> float:
-    """``0.01`` or ``1%``."""
-    number = text.strip()
-    try:
-        return float(number.removesuffix("%")) / (100 if number.endswith("%") else 1)
-    except ValueError:
-        raise SceneError(f"--tolerance {text!r}: must be a share of the mean, such as 0.01 or 1%") from None

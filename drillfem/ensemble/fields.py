@@ -16,6 +16,7 @@ import inspect
 import math
 import os
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -157,7 +158,7 @@ def _own(name: str) -> Callable[..., F8]:
 
 # -- modes ----------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
-class Modes:
+class Modes(ABC):
     """Eigenpairs of a covariance on [0, length], from the largest eigenvalue down.
 
     ``eigenvalues`` (n,): times length, m (for a field without unit). ``variance``: integral of C(x, x) over the length,
@@ -168,9 +169,9 @@ class Modes:
     variance: float
     length: float
 
+    @abstractmethod
     def __call__(self, points: npt.ArrayLike) -> F8:
         """Eigenfunctions (n, m) at points (m,) in m; those beyond the ends are taken to the ends."""
-        raise NotImplementedError
 
     @property
     def terms(self) -> int:

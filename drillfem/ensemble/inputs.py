@@ -27,7 +27,6 @@ import numpy.typing as npt
 from drillfem.ensemble.fields import F8, KarhunenLoeve, Modes, covariance, exact_modes, galerkin_modes
 from drillfem.errors import SceneError
 from drillfem.scene import Scene
-from drillfem.scene.ladder import gain
 from drillfem.scene.uncertain import FIELDS, Random, number_at, value_at, with_value
 
 STATIC, DYNAMIC = FIELDS["contact.friction"]
@@ -132,6 +131,11 @@ class Inputs:
             }
         return told
 
+    @property
+    def middle(self) -> Scene:
+        """Scene of the member in the middle of all inputs: one like those of the others."""
+        return self.member(np.full(self.dimension, 0.5)).scene
+
     def member(self, u: npt.ArrayLike) -> Member:
         """Member of numbers u (dimension,), each > 0 and < 1. Raises SceneError where its scene is impossible."""
         from scipy.special import ndtri
@@ -211,4 +215,4 @@ def reach(scene: Scene) -> float:
     It gains what its block speed, or steady drilling, takes it. How far a string slides that is pushed by a force is
     not known beforehand: a field on such a hole ends with the string, and goes on as it ends.
     """
-    return scene.length + 2 * gain(scene)
+    return scene.length + 2 * scene.gain()

@@ -11,6 +11,7 @@ import math
 from collections.abc import Hashable
 from typing import TYPE_CHECKING, Any
 
+from ..errors import SimulationError
 from ..results import Result, ResultWriter
 from ..scene import Scene
 
@@ -31,8 +32,11 @@ class Worker:
         """scene: one like the members, to be set up now, kernels and all; None: with the first member."""
         self._rod: Rod | None = None
         self._structure: Hashable = None
-        if scene is not None and _steps_a_rod(scene):
-            self._march(scene, scene.time.start + 2 * scene.time.step)
+        if scene is not None and scene.time.analysis == "dynamic":
+            try:
+                self._simulate(scene, scene.time.start + 2 * scene.time.step)
+            except SimulationError:
+                self._rod = None  # members will say so, each for itself
 
     def run(self, scene: Scene) -> dict[str, float]:
         """Summary numbers of a member: see :func:`numbers`. Raises SceneError, SimulationError."""
@@ -40,13 +44,13 @@ class Worker:
 
     def simulate(self, scene: Scene) -> Result:
         """A member with its history, in memory and without pictures. Raises SceneError, SimulationError."""
+        return self._simulate(scene, None)
+
+    def _simulate(self, scene: Scene, until: float | None) -> Result:
         if not _steps_a_rod(scene):
             from ..solve import simulate
 
-            return simulate(scene, warn=False)
-        return self._march(scene, scene.time.end)
-
-    def _march(self, scene: Scene, until: float) -> Result:
+            return simulate(scene, until=until, warn=False)
         from ..solve.direct import march
 
         def writer(model: str, dofs: int, variables: dict[str, str]) -> ResultWriter:
@@ -54,7 +58,7 @@ class Worker:
             made.pictured = False
             return made
 
-        result: Result = march(self._rod_of(scene), writer, until, None)
+        result: Result = march(self._rod_of(scene), writer, scene.time.end if until is None else until, None)
         return result
 
     def _rod_of(self, scene: Scene) -> Rod:

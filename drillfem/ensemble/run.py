@@ -88,7 +88,7 @@ class Runner:
     def __init__(self, job: Job, rank: int = 0) -> None:
         self.job, self.rank = job, rank
         self.history_units: dict[str, str] = {}
-        self.worker = Worker(middle(job.inputs))
+        self.worker = Worker(job.inputs.middle)
 
     def __call__(self, index: int, u: F8) -> Outcome:
         """Member ``index`` of numbers u (dimension,). What goes wrong with it is in the outcome."""
@@ -133,11 +133,6 @@ class Runner:
                 values = np.interp(self.job.times, history["time"].values, history[name].values)
                 kept[f"history_{name}"] = values.astype(np.float32)
         return kept
-
-
-def middle(inputs: Inputs) -> Scene:
-    """The member in the middle of all inputs: a scene like those of the others."""
-    return inputs.member(np.full(inputs.dimension, 0.5)).scene
 
 
 def units_of(result: Result, found: Mapping[str, float]) -> dict[str, str]:
@@ -450,7 +445,7 @@ def _times(scene: Scene) -> F8:
 
 def _warm_up(runner: Runner, keep: Sequence[str]) -> None:
     """Compile what a member needs by a very short one, and see that what is to be kept exists."""
-    scene = middle(runner.job.inputs)
+    scene = runner.job.inputs.middle
     if scene.time.analysis == "dynamic":
         end = scene.time.start + min(scene.time.end - scene.time.start, max(2 * scene.time.step, 3e-3))
         scene = replace(scene, time=replace(scene.time, end=end))

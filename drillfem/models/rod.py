@@ -333,20 +333,21 @@ class Rod:
         )
 
     def _resistance(self) -> Saturating | None:
-        bit = self.scene.bit
-        if bit is None or not self.scene.resists:
-            return None
-        # (7-5) and (7-6) as printed push the bit forward
-        sign = -1.0 if self.literal else 1.0
-        return Saturating(self._load(sign * bit.saturating.strength), self._load(bit.saturating.rate))
+        strength, rate = self._saturating
+        return Saturating(self._load(strength), self._load(rate)) if self.scene.resists else None
 
     def resistance(self, speed: float) -> float:
         """Force (N) of rock that saturates, against a lower end that advances with ``speed`` (m/s); 0 without it."""
+        strength, rate = self._saturating
+        return -strength * math.expm1(-rate * max(0.0, speed))
+
+    @property
+    def _saturating(self) -> tuple[float, float]:
         bit = self.scene.bit
         if bit is None or not self.scene.resists:
-            return 0.0
-        strength = -bit.saturating.strength if self.literal else bit.saturating.strength
-        return -strength * math.expm1(-bit.saturating.rate * max(0.0, speed))
+            return 0.0, 0.0
+        # (7-5) and (7-6) as printed push the bit forward
+        return (-1.0 if self.literal else 1.0) * bit.saturating.strength, bit.saturating.rate
 
     def _lump(self) -> vw.Lump | None:
         alpha, c = self.scene.inertia.distributed, self._load

@@ -8,6 +8,7 @@ from typing import Any
 
 from drillfem.meshes.points import distribute
 from drillfem.plan.pilot import Pilot, run_pilot
+from drillfem.results.atomic import plain
 from drillfem.scene import Scene
 from drillfem.scene.ladder import BESIDE, MODELS, Finding, findings, giver, lowest, obstacle, rank
 from drillfem.scene.nominal import lumps, quantity
@@ -63,7 +64,7 @@ class Plan:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        plain = {
+        told = {
             "scene": self.scene.name,
             "model": self.chosen,
             "reason": self.reason,
@@ -79,16 +80,7 @@ class Plan:
             "lost": list(self.lost),
             "notes": list(self.notes),
         }
-        return _finite(plain)
-
-
-def _finite(value: Any) -> Any:
-    """Plain data in which numbers that JSON does not know are None."""
-    if isinstance(value, dict):
-        return {name: _finite(x) for name, x in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(x) for x in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        return dict(plain(told))
 
 
 def plan_of(scene: Scene, pilot: bool = True) -> Plan:

@@ -71,7 +71,6 @@ class Row:
     reason: str = ""
     scatter: tuple[float, float] | None = None
     imitated: Value | None = None
-    imitated_verdict: str = ""
 
     @property
     def ratio(self) -> float | None:
@@ -238,8 +237,7 @@ def compare(case: Case, studio: Studio, imitated: bool = False, brief: bool = Fa
                 tried.sort(key=lambda pair: bool(pair[0].changes or pair[0].numerics))
                 found = [(v.label, x) for v, f in tried if (x := f.value(claim)) is not None]
                 reason = ". ".join(filter(None, (reason, _explanation(claim, value, found))))
-        judged = judge(claim, mine) if mine is not None else ""
-        rows.append(Row(claim, value, verdict, reason, scatter, mine, judged))
+        rows.append(Row(claim, value, verdict, reason, scatter, mine))
     tables = [] if brief else [_table(case, experiment, studio) for experiment in case.experiments]
     return Report(case, tuple(rows), tuple(tables), time.perf_counter() - start)
 

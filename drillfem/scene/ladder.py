@@ -158,17 +158,11 @@ class Bend(NamedTuple):
     turn: float
 
 
-def gain(scene: Scene) -> float:
-    """Length of hole (m) that the string gains in the run: what block speed, or steady drilling, takes it."""
-    rate = max(scene.top_drive.block_speed or 0.0, scene.nominal().rate_of_penetration)
-    return (scene.time.end - scene.time.start) * rate if math.isfinite(rate) else 0.0
-
-
 def along(scene: Scene) -> tuple[F8, Frame] | None:
     """Measured depths (m,) along the hole that the string goes through, and its frame there; None along e3."""
     if not scene.hole.bends or scene.borehole is None:
         return None
-    last = min(scene.length + gain(scene), scene.borehole.length)
+    last = min(scene.length + scene.gain(), scene.borehole.length)
     at: F8 = np.linspace(0.0, last, 4001)  # type: ignore[assignment]
     return at, scene.borehole.frame(at)
 

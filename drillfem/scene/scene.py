@@ -224,6 +224,14 @@ class Scene:
         """
         return nominal(self, spin, weight)
 
+    def gain(self, weight: float | None = None) -> float:
+        """Length of hole (m) that the string gains in the run: what block speed, or steady drilling, takes it.
+
+        weight: on the bit, as for `nominal` (N).
+        """
+        rate = max(self.top_drive.block_speed or 0.0, self.nominal(weight=weight).rate_of_penetration)
+        return (self.time.end - self.time.start) * rate if math.isfinite(rate) else 0.0
+
     def obstacle(self, model: str) -> str:
         """Why `model` cannot represent this scene; empty if it can."""
         return ladder.obstacle(self, model)

@@ -123,11 +123,6 @@ def _lock_up(line: Line, names: list[str], friction: str, buckled: bool) -> list
     return notes
 
 
-def _number(value: float) -> float | None:
-    """What JSON can carry."""
-    return None if np.isnan(value) else value
-
-
 def run(
     scene: Scene,
     out: Path,
@@ -163,9 +158,9 @@ def run(
                     "operation": p.operation.name,
                     "weight_on_bit": p.operation.weight_on_bit,
                     "torque_on_bit": p.operation.torque_on_bit,
-                    "hook_load": _number(p.hook_load),
-                    "surface_torque": _number(p.surface_torque),
-                    "largest_side_force": _number(deepest(p, p.side_force)[0]),
+                    "hook_load": p.hook_load,
+                    "surface_torque": p.surface_torque,
+                    "largest_side_force": deepest(p, p.side_force)[0],
                     "largest_side_force_at": deepest(p, p.side_force)[1],
                     "buckling": buckling_text(p, found.limits),
                 }

@@ -287,6 +287,16 @@ def test_bad_input_is_one_line_from_one_rank(tmp_path: Path, fake: Any) -> None:
 
 
 @mpi
+def test_a_bad_option_ends_all_ranks(tmp_path: Path) -> None:
+    out = tmp_path / "e"
+    code, told, err = finish(start(2, "horizontal-stochastic", "-n", "2", "--tolerance", "few", "--out", str(out)))
+    assert code == 2 and told == "" and not out.exists()
+    assert [line for line in err.splitlines() if line.startswith("error")] == [
+        "error: --tolerance 'few': must be more than 0 and less than 1, such as 0.05 or 5%"
+    ]
+
+
+@mpi
 @pytest.mark.verify
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGUSR1])
 def test_a_signal_to_one_rank_ends_all_cleanly(tmp_path: Path, number: signal.Signals) -> None:

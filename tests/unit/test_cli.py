@@ -374,7 +374,7 @@ def test_a_bar_on_a_terminal() -> None:
 
 
 def test_clock() -> None:
-    assert [cli._clock(s) for s in (0, 59.6, 3599, 3661)] == ["0:00", "1:00", "59:59", "1:01:01"]
+    assert [cli.clock(s) for s in (0, 59.6, 3599, 3661)] == ["0:00", "1:00", "59:59", "1:01:01"]
 
 
 def test_a_short_run_has_a_table_too() -> None:

@@ -29,7 +29,6 @@ from drillfem.scene.ladder import (
     critical_weight,
     distance,
     findings,
-    gain,
     giver,
     growing_motions,
     hole_rule,
@@ -145,7 +144,7 @@ def test_a_hole_is_what_its_geometry_is(
     bend = bend_of(scene)
     assert bend is not None
     assert bend.curvature == pytest.approx(curvature, rel=1e-6)
-    assert gain(scene) == pytest.approx(REACH - 1200, rel=1e-6)
+    assert scene.gain() == pytest.approx(REACH - 1200, rel=1e-6)
     assert bend.turn == pytest.approx(turn or REACH * curvature, rel=1e-3)
     expected = math.atan(2 * math.pi * 100 / 300) if inclination is None else inclination
     assert inclination_of(scene) == pytest.approx(expected, rel=1e-6)
