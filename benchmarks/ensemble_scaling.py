@@ -1,6 +1,6 @@
 """Cost of a member, memory, efficiency on 1 and 2 ranks, and what the store and the hand-out take.
 
-Writes docs/scaling.md: six minutes on two cores that nobody else uses; says so where the cores were shared. The runs
+Writes docs/scaling.md: seven minutes on two cores that nobody else uses; says so where the cores were shared. The runs
 on one rank and on two take turns, because machines drift by more than what is measured.
 """
 
@@ -25,7 +25,7 @@ from drillfem.ensemble.store import Outcome, Store, header_of, read
 
 SCENE = "horizontal-stochastic"
 #: Runs on two ranks; one on one rank before, between and after them.
-TURNS = 3
+TURNS = 4
 #: What docs/scaling.md asks about.
 MANY, CORES = 100_000, 1000
 
@@ -82,10 +82,11 @@ import sys, time
 import numpy as np
 from mpi4py import MPI
 from mpi4py.futures import MPICommExecutor
+from drillfem.ensemble.run import BACKOFF
 from drillfem.ensemble.sampling import Sampler
 
 count, u = int(sys.argv[1]), Sampler("monte-carlo", 100, 0)
-with MPICommExecutor(MPI.COMM_WORLD, root=0) as executor:
+with MPICommExecutor(MPI.COMM_WORLD, root=0, backoff=BACKOFF) as executor:
     if executor is not None:
         start = time.perf_counter()
         for _ in executor.map(len, ([(i, u.member(i))] for i in range(count))):
@@ -171,11 +172,13 @@ def page(scratch: Path, count: int, until: float | None, many: int) -> str:
     clock = float(alone["wall_seconds"].sum())
     cost = clock / count
     rows, shared = [], 1 - float(alone["seconds"].sum()) / clock
+    waited = 1 - sum(float(p["seconds"].sum()) for p, *_ in pairs) / sum(
+        float(p["wall_seconds"].sum()) for p, *_ in pairs
+    )
     alone_seconds = sum(session["seconds"] for session, _ in singles)
     start_end = sum(wall - session["seconds"] for session, wall in singles) / len(singles)
     rows.append(_row(1, alone, alone_seconds, cost, start_end))
     for data, session, wall in pairs:
-        shared = max(shared, 1 - float(data["seconds"].sum() / data["wall_seconds"].sum()))
         rows.append(_row(2, data, session["seconds"], cost, wall - session["seconds"]))
     two = sum(session["seconds"] for _, session, _ in pairs)
     drift = [float(part.mean()) for part in np.array_split(alone["wall_seconds"].values, len(singles))]
@@ -208,6 +211,8 @@ def page(scratch: Path, count: int, until: float | None, many: int) -> str:
         machine="; ".join(f"{name}: {1e3 * value:.1f} ms" for name, value in machine().items()),
         quiet=quiet,
         turns=TURNS,
+        waited=100 * waited,
+        waited_alone=100 * shared,
         overall=100 * TURNS * clock / (2 * two),
         drift=100 * (max(drift) / min(drift) - 1),
         efficiency=table(
@@ -261,9 +266,10 @@ This machine: {machine}.
 seconds. The members of one rank were computed in parts before, between and after the runs on two ranks, because this
 machine drifts: a member of the slowest part took {drift:.0f} % longer than one of the fastest. The single runs scatter
 by as much. Busy is the share of the time in which the ranks had a member at work, and does not depend on that: what it
-lacks is what handing out, storing and waiting for the last member take. Seconds are from the first member to the last
-one stored. Start and end: MPI, imports, kernels from the cache, members.nc. All runs stored the same members, bit for
-bit.
+lacks is what handing out, storing and waiting for the last member take. During a member two ranks wait
+{waited:.1f} % of the time for a processor, one rank {waited_alone:.1f} %: rank 0 takes messages and writes as well.
+Seconds are from the first member to the last one stored. Start and end: MPI, imports, kernels from the cache,
+members.nc. All runs stored the same members, bit for bit.
 
 A member takes {cpu:.3f} s of a core; the standard deviation between members is {spread:.0f} % of that.
 
