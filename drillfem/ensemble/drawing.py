@@ -175,9 +175,9 @@ def levels(path: Path, found: Multilevel, name: str, verdict: str) -> Path:
         )  # fmt: skip
         for k, (title, one, pair, letter, slope, sign) in enumerate(panels):
             axes = figure.add_axes((0.075 + k * 0.325, 0.27, 0.245, 0.50))
-            axes.semilogy(at, one, "s-", ms=5, color=style.GREY, label="of a level")
+            axes.semilogy(at, one, "s-", ms=5, color=style.GREY, label="a level alone")
             x, y = at[1:], pair[1:]
-            axes.semilogy(x, y, "o", ms=6, color=style.BLUE, label="of a pair" if sign > 0 else "of differences")
+            axes.semilogy(x, y, "o", ms=6, color=style.BLUE, label="pairs: their difference, the cost of both")
             if k == 1:
                 half = np.minimum(1.96 * error[1:], 0.999 * y), 1.96 * error[1:]
                 axes.errorbar(x, y, yerr=half, fmt="none", ecolor=style.BLUE, capsize=3)
@@ -190,7 +190,9 @@ def levels(path: Path, found: Multilevel, name: str, verdict: str) -> Path:
             axes.set_title(f"{title}\n{letter} = {_signed(slope)}", fontsize=11)
             axes.set_xlabel("level")
             axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-            axes.legend(loc="best", fontsize=9)
+        figure.legend(
+            *axes.get_legend_handles_labels(), loc="upper right", bbox_to_anchor=(0.985, 0.93), ncols=2, fontsize=10
+        )
         figure.text(0.028, 0.085, "\n".join(textwrap.wrap(verdict, 112)), fontsize=10.5, color=style.INK, va="center")
         return style.save(figure, path)
 

@@ -226,8 +226,8 @@ class Multilevel:
                 less = f"{1 / ratio:.2g} times less than" if ratio < 0.9 else "as much as"
                 return (
                     f"MLMC gains nothing over plain Monte Carlo on level {level}, which is within {100 * tolerance:g} "
-                    f"% of level {last} and costs {less} MLMC ({slopes}); over plain Monte "
-                    f"Carlo on level {last} it would gain {times}"
+                    f"% of level {last} and costs {less} MLMC ({slopes}); plain Monte "
+                    f"Carlo on level {last} costs {times} as much"
                 )
         if gain.high <= 1:
             return (

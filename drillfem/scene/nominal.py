@@ -159,36 +159,51 @@ def quantity(value: float, unit: str) -> str:
 
 
 def _describe_hole(scene: Scene) -> list[tuple[str, str]]:
-    """What `describe` says of a hole that bends, and of the contact with it."""
-    contact = scene.contact
-    if contact is None or not scene.hole.bends or (hole := scene.borehole) is None:
+    """What `describe` says of a hole, and of the contact with it."""
+    contact, diameter = scene.contact, scene.hole.diameter
+    if contact is None or scene.hole.kind == "none" or diameter is None:
         return []
-    sharpest, at = hole.sharpest()
-    end = hole.frame(scene.length)
-    north, east, down = end.position[0]
+    rows, narrowest = [("hole", "straight, along the string")], diameter / 2
+    geometry = scene.borehole if scene.hole.bends or scene.hole.caliper or scene.hole.section else None
+    if geometry is not None:
+        narrowest = float(geometry.table.radius.min())
+    if geometry is not None and scene.hole.bends:
+        sharpest, at = geometry.sharpest()
+        end = geometry.frame(scene.length)
+        north, east, down = end.position[0]
+        where = f"{north:.5g} m north, {east:.5g} m east, {down:.6g} m down"
+        inclined = f"inclined by {math.degrees(end.inclination[0]):.4g} deg"
+        bend = f"{math.degrees(sharpest) * 30:.3g} deg per 30 m at {at:.5g} m (radius {1 / sharpest:.4g} m)"
+        rows = [("hole", f"{scene.hole.kind}: at {scene.length:g} m {inclined}, {where}"), ("sharpest bend", bend)]
     widest = max(s.contact_radius for s in scene.string)
-    heaviest = max(scene.string, key=lambda s: s.mass_per_length)
-    load = heaviest.mass_per_length * scene.gravity.magnitude
-    layers = [(4 * s.section_stiffness().bending1 / contact.stiffness) ** 0.25 for s in scene.string]
-    period = 2 * math.pi * math.sqrt(heaviest.mass_per_length / contact.stiffness)
-    return [
-        (
-            "hole",
-            f"{scene.hole.kind}: at {scene.length:g} m inclined by {math.degrees(end.inclination[0]):.4g} deg, "
-            f"{north:.5g} m north, {east:.5g} m east, {down:.6g} m down",
-        ),
-        (
-            "sharpest bend",
-            f"{math.degrees(sharpest) * 30:.3g} deg per 30 m at {at:.5g} m (radius {1 / sharpest:.4g} m)",
-        ),
-        ("smallest clearance", quantity(float(hole.table.radius.min()) - widest, "m")),
-        (
-            "contact",
-            f"{quantity(load / contact.stiffness, 'm')} deep under the weight of the {heaviest.name}, boundary "
-            f"layer "
-            f"{min(layers):.3g} to {max(layers):.3g} m, period {quantity(period, 's')}",
-        ),
-    ]
+    rows.append(("smallest clearance", quantity(narrowest - widest, "m")))
+    if scene.hole.bends or any(scene.gravity.direction[:2]):
+        heaviest = max(scene.string, key=lambda s: s.mass_per_length)
+        depth = heaviest.mass_per_length * scene.gravity.magnitude / contact.stiffness
+        layers = [(4 * s.section_stiffness().bending1 / contact.stiffness) ** 0.25 for s in scene.string]
+        between = " to ".join(dict.fromkeys(f"{x:.3g}" for x in (min(layers), max(layers))))
+        period = 2 * math.pi * math.sqrt(heaviest.mass_per_length / contact.stiffness)
+        under = f"{quantity(depth, 'm')} deep under the weight of the {heaviest.name}"
+        rows.append(("contact", f"{under}, boundary layer {between} m, period {quantity(period, 's')}"))
+    return rows
+
+
+def _describe_push(scene: Scene) -> list[tuple[str, str]]:
+    """What `describe` says of a string that slides along its hole: what drives it, and what resists (chapter 7)."""
+    rows, contact, bit, motor = [], scene.contact, scene.bit, scene.motor
+    if scene.ends.top == "sliding" and any(scene.ends.top_force):
+        rows.append(("push", quantity(scene.ends.top_force[2], "N")))
+    if motor is not None:
+        rows.append(("motor", f"{quantity(motor.force, 'N')} at {motor.frequency / (2 * math.pi):.4g} Hz"))
+    if bit is not None and scene.resists:
+        most, over = quantity(bit.saturating.strength, "N"), quantity(1 / bit.saturating.rate, "m/s")
+        rows.append(("bit", f"resists with up to {most}, which builds up over {over}"))
+    if rows and contact is not None and not scene.hole.bends:
+        mass = sum(s.mass_per_length * s.length for s in scene.string)  # lumped masses at the ends touch nothing
+        across = mass * scene.gravity.magnitude * math.hypot(*scene.gravity.direction[:2])
+        text = f"{quantity(contact.friction_static * across, 'N')} with all of the string's weight on the wall"
+        rows.append(("friction", text))
+    return rows
 
 
 def describe(scene: Scene) -> list[tuple[str, str]]:
@@ -239,6 +254,7 @@ def describe(scene: Scene) -> list[tuple[str, str]]:
         rows.append(("first torsional frequency", f"{torsional_frequency(scene):.4g} Hz"))
     if scene.bit is not None and not scene.resists:
         rows += [("hook load", f"{n.hook_load / 1e3:.6g} kN"), ("weight on bit", q(n.weight_on_bit, "N"))]
+    rows += _describe_push(scene)
     if scene.bites and not scene.drills:
         rows += [
             (

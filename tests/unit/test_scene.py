@@ -132,6 +132,10 @@ def test_description_carries_units() -> None:
     rows = dict(describe(load_scene("roll-up")))
     assert rows["run"] == "10 load steps"
     assert "hook load" not in rows
+    rows = dict(describe(load_scene("horizontal-a")))
+    assert rows["smallest clearance"] == "10 mm"
+    assert rows["push"] == "5.5 kN" and rows["motor"] == "500 N at 1.667 Hz"
+    assert rows["friction"].startswith("4.536 kN")
 
 
 # -- units and overrides ----------------------------------------------------------------------------------
