@@ -262,12 +262,7 @@ def multilevel(
     scenes = level_scenes(scene, levels, refined or REFINED)
     members = Members(scenes, name, jobs)
     with members.ready() as run:
-
-        def told(level: int, points: F8) -> tuple[F8, F8]:
-            log.info("level %d: %d members", level, len(points))
-            return run(level, points)
-
-        found = run_levels(told, members.inputs[0].dimension, levels, seed, pilot, tolerance)
+        found = run_levels(run, members.inputs[0].dimension, levels, seed, pilot, tolerance)
     verdict = found.verdict(tolerance or _TOLERANCES[-1])
     _print(level_table(found, name) + _reasons(members))
     print(f"verdict: {verdict}")

@@ -8,6 +8,7 @@ M. B. Giles, Multilevel Monte Carlo methods, Acta Numerica 24 (2015).
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -29,6 +30,10 @@ Run = Callable[[int, F8], tuple[F8, F8]]
 #: What a level is finer in than the next coarser one.
 REFINED = ("mesh.elements", "time.step")
 _RESAMPLED = 400
+#: The levels take turns, in so many rounds: a machine that slows down meanwhile would else bend the slope of the cost.
+_ROUNDS = 4
+
+log = logging.getLogger("drillfem.ensemble")
 
 
 @dataclass(frozen=True)
@@ -310,22 +315,28 @@ def multilevel(
         seconds = seconds + alone
         return Pairs(fine[good], coarse[good], seconds[good], alone[good], int((~good).sum()))
 
-    pairs = [more(level, 0, pilot) for level in range(levels)]
+    pairs: list[Pairs] = []
+    for first in range(0, pilot, size := math.ceil(pilot / _ROUNDS)):
+        log.info("pairs %d to %d of %d on each of %d levels", first + 1, min(first + size, pilot), pilot, levels)
+        found = [more(level, first, min(size, pilot - first)) for level in range(levels)]
+        pairs = [a.joined(b) for a, b in zip(pairs, found, strict=True)] if pairs else found
     for level, p in enumerate(pairs):
         if len(p.fine) < 4:
             raise SceneError(f"level {level}: {p.failed} of {pilot} pairs failed, so there is nothing to go by")
-    found = Multilevel(tuple(pairs))
-    while tolerance is not None and found.mean.relative > tolerance:
-        target = tolerance * abs(found.mean.value) * found.mean.error / (found.mean.high - found.mean.value)
-        lacking = found.allocation(target) - found.counts.astype(int)
+    known = Multilevel(tuple(pairs))
+    while tolerance is not None and known.mean.relative > tolerance:
+        target = tolerance * abs(known.mean.value) * known.mean.error / (known.mean.high - known.mean.value)
+        lacking = known.allocation(target) - known.counts.astype(int)
         if not (lacking > 0).any():
             break
         for level in np.flatnonzero(lacking > 0):
             done = len(pairs[level].fine) + pairs[level].failed
             # at most twice as many at a time: the first few do not know the variance well
-            pairs[level] = pairs[level].joined(more(int(level), done, int(min(lacking[level], done))))
-        found = Multilevel(tuple(pairs))
-    return found
+            count = int(min(lacking[level], done))
+            log.info("level %d: %d more pairs", level, count)
+            pairs[level] = pairs[level].joined(more(int(level), done, count))
+        known = Multilevel(tuple(pairs))
+    return known
 
 
 def level_scenes(scene: Scene, levels: int, refined: Sequence[str] = REFINED) -> list[Scene]:
