@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import signal
 import sys
 from collections.abc import Iterator
 from importlib.util import find_spec
@@ -11,6 +12,10 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
+
+# a shell starts jobs in the background (`make test &`) deaf to Ctrl-C, and so would be those that tests interrupt
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 #: Folders and files whose modules need DOLFINx to be read.
 _ROD = ("forms/", "convergence/", "physics/test_rod", "stability/test_rod", "stability/test_contact_rod")
