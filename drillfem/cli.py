@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 PLAIN_INTERVAL = 10.0
 """Seconds of wall time between two progress lines where there is no terminal."""
+FIRST_RANK = 5.0
+"""Seconds that other ranks leave the first one to say what is wrong."""
 
 app = typer.Typer(
     name="drillfem",
@@ -58,6 +60,8 @@ def main(arguments: list[str] | None = None) -> int:
         message, code = "interrupted", 130
     if code != 2 or _rank() == "0":  # bad input is bad on all ranks
         stderr.print(message, markup=False, soft_wrap=True)
+    else:
+        time.sleep(FIRST_RANK)  # mpirun ends the job with the first rank that fails: it shall be the one that speaks
     return code
 
 
