@@ -26,6 +26,6 @@ verify: ## the long tests and the benchmarks (hours)
 
 # CERT=FILE hands the certificates of the host to pip, where the network needs them (podman, buildah).
 image: ## with docker, podman or buildah
-	@builder=$$(command -v docker || command -v podman || command -v buildah) || \
-	    { echo "make image needs docker, podman or buildah" >&2; exit 1; }; \
+	@builder=$$($(if $(CERT),,command -v docker ||) command -v podman || command -v buildah) || \
+	    { echo "make image needs $(if $(CERT),,docker, )podman or buildah" >&2; exit 1; }; \
 	$$builder build -t $(IMAGE) $(if $(CERT),--build-arg PIP_CERT=/host-ca.crt -v $(CERT):/host-ca.crt:ro) .
