@@ -21,7 +21,7 @@ from common import DOCS, machine, table
 import drillfem
 from drillfem.ensemble.member import Worker, numbers
 from drillfem.render import style
-from drillfem.reproduce.chapter7 import LITERAL, UNPROJECTED, clearance
+from drillfem.reproduce.chapter7 import LITERAL, UNPROJECTED, clearance, sag
 from drillfem.scene import Scene, load_scene
 
 Array = npt.NDArray[np.float64]
@@ -161,10 +161,9 @@ def draw_sweep(found: Mapping[str, list[Member]], b: float, folder: Path) -> Non
 
 def friction(gap: float) -> float:
     """k_fr (W - 2/3 w l), l = (72 EI c_gap/w)^(1/4) (spec 10.5), of string and bit (N)."""
-    section = scene("a", {}).string[0]
-    w = section.mass_per_length * 9.81
-    sag = (72 * section.section_stiffness().bending1 * gap / w) ** 0.25
-    return 0.1 * (60 * w + 20 * 9.81 - 2 / 3 * w * sag)
+    given = scene("a", clearance(gap))
+    w = given.string[0].mass_per_length * 9.81
+    return 0.1 * (60 * w + 20 * 9.81 - 2 / 3 * w * sag(given))
 
 
 def sweep_table(found: Mapping[str, list[Member]], b: float) -> str:

@@ -318,7 +318,7 @@ def _in_processes(todo: list[int], found: list[Member], until: float | None, job
 
     def hire() -> Connection:
         ours, theirs = context.Pipe()
-        with _single_threaded():
+        with single_threaded():
             # a daemon: it does not outlive this process
             workers[ours] = context.Process(target=_worker, args=(theirs,), daemon=True)
             workers[ours].start()
@@ -359,7 +359,7 @@ def _in_processes(todo: list[int], found: list[Member], until: float | None, job
 
 
 @contextmanager
-def _single_threaded() -> Iterator[None]:
+def single_threaded() -> Iterator[None]:
     """Processes started here use one thread each for linear algebra, unless the user has said otherwise."""
     new = [name for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS") if name not in os.environ]
     os.environ.update(dict.fromkeys(new, "1"))
@@ -408,7 +408,7 @@ def _check_place(out: Path) -> None:
 def _is_finished(member: Member, until: float | None) -> bool:
     """Whether the member's run has reached its end. SceneError if its folder holds another run, or a longer one."""
     from drillfem.results import check_new_folder, is_result
-    from drillfem.results.result import _json
+    from drillfem.results.atomic import read_json
 
     start, end = member.scene.time.start, member.scene.time.end if until is None else until
     if not end > start:
@@ -417,11 +417,11 @@ def _is_finished(member: Member, until: float | None) -> bool:
     if not is_result(folder):
         check_new_folder(folder)
         return False
-    if Scene.from_dict(_json(folder / "manifest.json")["scene"]) != member.scene:
+    if Scene.from_dict(read_json(folder / "manifest.json")["scene"]) != member.scene:
         raise SceneError(f"{folder}: holds the result of another scene; choose another folder for the sweep")
     if not (folder / "summary.json").exists():
         return False
-    summary = _json(folder / "summary.json")
+    summary = read_json(folder / "summary.json")
     reached = start + float(summary.get("simulated_seconds") or 0.0)
     near = 1e-9 * max(1.0, abs(end))
     if reached > end + near:
@@ -451,11 +451,11 @@ def _fill(table: SweepTable, i: int, member: Member, status: str, reason: str = 
 def _numbers(member: Member) -> tuple[dict[str, float], dict[str, str]]:
     """The statistics of a run, from its summary or its history, with their units."""
     from drillfem.results import open_result, statistics
+    from drillfem.results.atomic import read_json
     from drillfem.results.history import STANDARD
-    from drillfem.results.result import _json
     from drillfem.results.table import LATE, RUN, WHOLE, nominal_statistics
 
-    summary = _json(member.folder / "summary.json")
+    summary = read_json(member.folder / "summary.json")
     units = {row.key: _SI.get(row.unit, row.unit) for row in (*WHOLE, *LATE, *RUN)}
     stored = summary.get("statistics", {})
     if member.scene.bit is not None and "this run" in stored:

@@ -58,10 +58,10 @@ class Members:
         from concurrent.futures import ProcessPoolExecutor
         from multiprocessing import get_context
 
-        from drillfem.sweep import _single_threaded
+        from drillfem.sweep import single_threaded
 
         with (
-            _single_threaded(),
+            single_threaded(),
             ProcessPoolExecutor(self.jobs, get_context("spawn"), _prepare, (self.inputs, self.quantity)) as pool,
         ):
             self._pool = pool

@@ -57,7 +57,6 @@ def realisations(path: Path, time: F8, values: F8, name: str, unit: str, across:
 def convergence(path: Path, found: Statistics) -> Path:
     """Running mean and standard deviation over the number of members, with the bands of the mean."""
     band = running(found.values)
-    spread = band.mean - found.mean.value, np.sqrt(np.maximum(_running_variance(found.values), 0))
     first = min(9, len(found.values) - 1)
     with style.page(1000, 560) as figure:
         style.heading(
@@ -77,7 +76,7 @@ def convergence(path: Path, found: Statistics) -> Path:
             top.set_ylim(low - room, high + room)
         top.set_ylabel(words(found.name, found.unit))
         _legend(top)
-        bottom.plot(at[1:], spread[1][1:], color=style.VERMILION)
+        bottom.plot(at[1:], band.deviation[1:], color=style.VERMILION)
         deviation = found.standard_deviation
         if math.isfinite(deviation.high):
             bottom.axhspan(deviation.low, deviation.high, color=style.ORANGE, alpha=0.25, lw=0)
@@ -228,13 +227,6 @@ def sensitivities(path: Path, found: Indices, name: str) -> Path:
 def _legend(axes: Axes) -> None:
     """Above the axes, at the right: it covers nothing."""
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4)
-
-
-def _running_variance(values: F8) -> F8:
-    count = np.arange(1, len(values) + 1)
-    x = values - values[0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return (np.cumsum(x**2) - np.cumsum(x) ** 2 / count) / (count - 1)
 
 
 def _signed(slope: Estimate) -> str:

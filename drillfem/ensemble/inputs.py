@@ -63,6 +63,12 @@ class Number:
         clipped = min(max(value, low), high)
         return (round(clipped) if self.whole else clipped), int(clipped != value)
 
+    def put(self, data: Any, value: float) -> Any:
+        """Raw scene data with this value, and what is proportional to it."""
+        for target, ratio in [*((t, 1.0) for t in self.random.targets), *self.proportional.items()]:
+            data = with_value(data, target, ratio * value)
+        return data
+
 
 @dataclass(frozen=True)
 class Field:
@@ -152,10 +158,7 @@ class Inputs:
                 value, clipped = number.at(float(x))
                 scalars[name] = value
                 clips += clipped
-                for target in number.random.targets:
-                    data = with_value(data, target, value)
-                for target, ratio in number.proportional.items():
-                    data = with_value(data, target, ratio * value)
+                data = number.put(data, value)
             else:
                 normal[name][k] = ndtri(x)
         rows: dict[str, F8] = {}

@@ -32,11 +32,22 @@ class Worker:
         """scene: one like the members, to be set up now, kernels and all; None: with the first member."""
         self._rod: Rod | None = None
         self._structure: Hashable = None
-        if scene is not None and scene.time.analysis == "dynamic":
-            try:
-                self._simulate(scene, scene.time.start + 2 * scene.time.step)
-            except SimulationError:
-                self._rod = None  # members will say so, each for itself
+        if scene is not None:
+            self.warm_up(scene)
+
+    def warm_up(self, scene: Scene) -> Result | None:
+        """Compile what members like this scene need, by the first of its time; all of it in statics.
+
+        None where that fails: members will say so, each for itself.
+        """
+        until, time = None, scene.time
+        if time.analysis == "dynamic":
+            until = time.start + min(time.end - time.start, max(2 * time.step, 3e-3))
+        try:
+            return self._simulate(scene, until)
+        except SimulationError:
+            self._rod = None  # nobody knows what is left in it
+            return None
 
     def run(self, scene: Scene) -> dict[str, float]:
         """Summary numbers of a member: see :func:`numbers`. Raises SceneError, SimulationError."""

@@ -21,6 +21,7 @@ import numpy.typing as npt
 from drillfem.ensemble.sampling import Sampler
 from drillfem.ensemble.statistics import CONFIDENCE, Estimate
 from drillfem.errors import SceneError
+from drillfem.results.atomic import plain
 from drillfem.scene import Scene
 
 F8 = npt.NDArray[np.float64]
@@ -262,10 +263,10 @@ class Multilevel:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers, for JSON."""
-        return {
+        """Plain numbers, for JSON; what is infinite is None."""
+        facts = {
             "mean": vars(self.mean),
-            "bias": self.bias if math.isfinite(self.bias) else None,
+            "bias": self.bias,
             "alpha": vars(self.alpha),
             "beta": vars(self.beta),
             "gamma": vars(self.gamma),
@@ -287,6 +288,7 @@ class Multilevel:
                 for level, p in enumerate(self.pairs)
             ],
         }
+        return dict(plain(facts))
 
 
 def allocation(variances: npt.ArrayLike, costs: npt.ArrayLike, error: float) -> npt.NDArray[np.int64]:

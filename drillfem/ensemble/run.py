@@ -89,8 +89,12 @@ class Runner:
 
     def __init__(self, job: Job, rank: int = 0) -> None:
         self.job, self.rank = job, rank
-        self.history_units: dict[str, str] = {}
-        self.worker = Worker(job.inputs.middle)
+        self.worker = Worker()
+        first = self.worker.warm_up(job.inputs.middle)
+        #: units by history variable; None where the first run did not tell
+        self.history_units: dict[str, str] | None = None
+        if first is not None:
+            self.history_units = {str(n): str(v.attrs["units"]) for n, v in first.history.data_vars.items()}
 
     def __call__(self, index: int, u: F8) -> Outcome:
         """Member ``index`` of numbers u (dimension,). What goes wrong with it is in the outcome."""
@@ -157,7 +161,6 @@ def resident() -> int:
 def _toml(inputs: Inputs, u: F8, scene: Scene | None) -> str:
     """The scene of a member as a file; of one that is impossible, what was asked for."""
     from drillfem.scene.toml import dumps
-    from drillfem.scene.uncertain import with_value
 
     if scene is not None:
         return scene.to_toml()
@@ -165,9 +168,7 @@ def _toml(inputs: Inputs, u: F8, scene: Scene | None) -> str:
     for (name, _), x in zip(inputs.order, u, strict=True):
         if name in inputs.numbers:
             number = inputs.numbers[name]
-            value, _ = number.at(float(x))
-            for target, ratio in [*((t, 1.0) for t in number.random.targets), *number.proportional.items()]:
-                data = with_value(data, target, ratio * value)
+            data = number.put(data, number.at(float(x))[0])
     return dumps(data)
 
 
@@ -407,7 +408,7 @@ class _Prepared:
         sampler.member(0)  # a set is made once, before there are threads
         job = Job(inputs, tuple(keep), _times(scene))
         _runner = runner = Runner(job)
-        _warm_up(runner, keep)
+        _check_kept(runner, keep)
         header["kept"], header["axes"] = _shapes(job, runner)
         store = Store(out, header)
         todo = deque(stores.missing(store.status, count, retry))
@@ -445,23 +446,14 @@ def _times(scene: Scene) -> F8:
     return np.linspace(scene.time.start, last, rows // every + 1, dtype=np.float64)
 
 
-def _warm_up(runner: Runner, keep: Sequence[str]) -> None:
-    """Compile what a member needs by a very short one, and see that what is to be kept exists."""
-    scene = runner.job.inputs.middle
-    if scene.time.analysis == "dynamic":
-        end = scene.time.start + min(scene.time.end - scene.time.start, max(2 * scene.time.step, 3e-3))
-        scene = replace(scene, time=replace(scene.time, end=end))
-    try:
-        result = runner.worker.simulate(scene)
-    except SimulationError:
-        # the members will say so, each for itself
-        runner.worker = Worker()
+def _check_kept(runner: Runner, keep: Sequence[str]) -> None:
+    """See that what is to be kept exists."""
+    if runner.history_units is None:
         return
-    names = [*runner.job.inputs.fields, *map(str, result.history.data_vars)]
+    names = [*runner.job.inputs.fields, *runner.history_units]
     for name in keep:
         if name not in names:
             raise SceneError(f"--keep {name}: must be one of {', '.join(names)}")
-    runner.history_units = {str(n): str(v.attrs["units"]) for n, v in result.history.data_vars.items()}
 
 
 def _shapes(job: Job, runner: Runner) -> tuple[dict[str, list[str]], dict[str, list[float]]]:
@@ -476,7 +468,7 @@ def _shapes(job: Job, runner: Runner) -> tuple[dict[str, list[str]], dict[str, l
             dimension = dimension or (f"depth_{name}" if "depth" in axes else "depth")
             kept[f"field_{name}"], axes[dimension] = [dimension, "1"], axis
         else:
-            kept[f"history_{name}"] = ["time", runner.history_units.get(name, "1")]
+            kept[f"history_{name}"] = ["time", (runner.history_units or {}).get(name, "1")]
             axes["time"] = [float(job.times[0]), float(job.times[-1]), len(job.times)]
     return kept, axes
 

@@ -54,7 +54,7 @@ class Sampler:
         """Point (dimension,) of member i, each number > 0 and < 1. Raises IndexError beyond the count of a set."""
         if self.method == "monte-carlo":
             sequence = np.random.SeedSequence(self.seed, spawn_key=(*self.stream, i))
-            return _open(np.random.Generator(np.random.PCG64(sequence)).random(self.dimension))
+            return opened(np.random.Generator(np.random.PCG64(sequence)).random(self.dimension))
         if not 0 <= i < (self.count or 0):
             raise IndexError(f"member {i}: must be from 0 to {(self.count or 0) - 1}")
         return np.array(self._set[i])
@@ -71,11 +71,11 @@ class Sampler:
         engine = family(self.dimension, **options)
         count = self.count or 1
         if self.method == "sobol":
-            return _open(engine.random_base2((count - 1).bit_length())[:count])
-        return _open(engine.random(count))
+            return opened(engine.random_base2((count - 1).bit_length())[:count])
+        return opened(engine.random(count))
 
 
-def _open(u: F8) -> F8:
+def opened(u: F8) -> F8:
     """Numbers from 0 to 1 without the ends, which an unbounded distribution has at infinity."""
     return np.clip(u, 2.0**-64, 1 - 2.0**-53)
 

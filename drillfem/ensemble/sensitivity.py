@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from drillfem.ensemble.sampling import _open
+from drillfem.ensemble.sampling import opened
 from drillfem.ensemble.statistics import CONFIDENCE, Estimate
 from drillfem.errors import MissingDependency, SceneError
 
@@ -90,7 +90,7 @@ def sensitivity(
     base = 2 ** math.ceil(math.log2(count))
     points = sampling.sample(problem, base, calc_second_order=False, scramble=True, skip_values=0, seed=seed)
     block = len(inputs) + 2
-    values = np.asarray(function(_open(points[: count * block])), dtype=np.float64).reshape(count, block)
+    values = np.asarray(function(opened(points[: count * block])), dtype=np.float64).reshape(count, block)
     good = np.isfinite(values).all(axis=1)
     failed = int((~np.isfinite(values)).sum())
     if good.sum() < 4:

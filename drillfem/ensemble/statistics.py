@@ -26,6 +26,7 @@ import numpy.typing as npt
 
 from drillfem.ensemble.sampling import METHODS, Sampler
 from drillfem.errors import SceneError
+from drillfem.results.atomic import plain
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -250,12 +251,14 @@ def density(
 class Running:
     """Mean of the first 1, 2, ... n members, each array (n,).
 
-    low, high: Student's interval, each for itself. always_low, always_high: wider, and right at all numbers of members
-    at once (asymptotically), so that one may look as often as one likes, and stop.
+    deviation: standard deviation of these members, nan of one. low, high: Student's interval, each for itself.
+    always_low, always_high: wider, and right at all numbers of members at once (asymptotically), so that one may look
+    as often as one likes, and stop.
     """
 
     count: npt.NDArray[np.int64]
     mean: F8
+    deviation: F8
     low: F8
     high: F8
     always_low: F8
@@ -284,7 +287,7 @@ def running(values: npt.ArrayLike, confidence: float = CONFIDENCE) -> Running:
     half[0] = wide[0] = math.inf
     wide = np.maximum(wide, half)  # its theory is about many
     centre = centre + shift
-    return Running(count, centre, centre - half, centre + half, centre - wide, centre + wide)
+    return Running(count, centre, deviation, centre - half, centre + half, centre - wide, centre + wide)
 
 
 def converged(
@@ -410,11 +413,10 @@ class Statistics:
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers, for JSON; an infinite end is None."""
 
-        def plain(x: Estimate) -> dict[str, float | None]:
-            found = {"value": x.value, "low": x.low, "high": x.high, "standard_error": x.error}
-            return {k: v if math.isfinite(v) else None for k, v in found.items()}
+        def said(x: Estimate) -> dict[str, float]:
+            return {"value": x.value, "low": x.low, "high": x.high, "standard_error": x.error}
 
-        return {
+        facts = {
             "quantity": self.name,
             "unit": self.unit,
             "sampling": self.method,
@@ -423,12 +425,13 @@ class Statistics:
             "awaited": self.awaited,
             "failed": {str(i): reason for i, reason in self.failed.items()},
             "failed_share": self.failed_share,
-            "mean": plain(self.mean),
-            "standard_deviation": plain(self.standard_deviation),
-            "quantiles": {f"{p:g}": plain(q) for p, q in self.quantiles.items()},
+            "mean": said(self.mean),
+            "standard_deviation": said(self.standard_deviation),
+            "quantiles": {f"{p:g}": said(q) for p, q in self.quantiles.items()},
             "heavy_tailed": self.heavy_tailed,
             "bandwidth": None if self.density is None else self.density.bandwidth,
         }
+        return dict(plain(facts))
 
 
 def quantities(data: Dataset) -> list[str]:
@@ -476,6 +479,7 @@ def of(data: Dataset, name: str) -> Statistics:
         reason = next(iter(failed.values()), "")
         raise SceneError(f"quantity {name!r}: none of {len(every)} members has it{f' ({reason})' if reason else ''}")
     values, gone = x[has], len(failed)
+    width, support = bandwidth(values), SUPPORTS.get(name, (-math.inf, math.inf))
     return Statistics(
         name,
         str(data[name].attrs.get("units", "1")),
@@ -485,7 +489,7 @@ def of(data: Dataset, name: str) -> Statistics:
         mean(values),
         standard_deviation(values),
         {p: quantile(values, p, gone) for p in QUANTILES},
-        density(values, support=SUPPORTS.get(name, (-math.inf, math.inf))) if bandwidth(values) > 0 else None,
+        density(values, width, support) if width > 0 else None,
         str(data.attrs.get("method", METHODS[0])),
         awaited,
     )

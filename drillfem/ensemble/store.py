@@ -8,7 +8,6 @@ results, and is replaced in one go. ``failed/`` has the scene of every member th
 from __future__ import annotations
 
 import json
-import os
 import sqlite3
 import tempfile
 import tomllib
@@ -23,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drillfem.errors import SceneError, SimulationError
-from drillfem.results.atomic import remove_leftovers, replacing, write_json
+from drillfem.results.atomic import Lock, read_json, remove_leftovers, replacing, write_json
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -97,7 +96,7 @@ class Store:
         stored = check(self.folder, header)
         with _writing(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
-            self._lock = _lock(self.folder)
+            self._lock = Lock(self.folder)
         try:
             # another process may have been faster
             stored = check(self.folder, header)
@@ -167,9 +166,7 @@ class Store:
         """Let go of the folder."""
         with suppress(AttributeError):
             self._journal.close()
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+        self._lock.release()
 
     def _insert(self, outcome: Outcome) -> None:
         names = tuple((name, outcome.units.get(name, "1")) for name in outcome.numbers)
@@ -208,12 +205,10 @@ def failed_scene(folder: Path, index: int) -> Path:
 
 def header_of(folder: str | Path) -> dict[str, Any]:
     """What ensemble.json says. Raises SceneError where there is none."""
-    from drillfem.results.result import _json
-
     path = Path(folder)
     if not (path / HEADER).is_file():
         raise SceneError(f"{folder}: is not the folder of an ensemble, it has no {HEADER}")
-    return _json(path / HEADER)
+    return read_json(path / HEADER)
 
 
 def check(folder: Path, header: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -364,23 +359,6 @@ def _export_kept(
 
 
 # -- the folder -------------------------------------------------------------------------------------------------------
-def _lock(folder: Path) -> int | None:
-    """Keep a second run out of the folder. The lock goes with the process, however that ends."""
-    try:
-        import fcntl
-    except ImportError:  # Windows
-        return None
-    lock = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(lock)
-        raise SceneError(f"{folder}: another process is writing to it") from None
-    except OSError:  # a file system without locks
-        pass
-    return lock
-
-
 @contextmanager
 def _writing(folder: Path) -> Iterator[None]:
     """What keeps a folder from being written, in one line."""

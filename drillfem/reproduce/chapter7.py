@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from drillfem.scene import Scene
+
 from .claims import Case, Check, Claim, Experiment, Run, Runs, Value, Variation, statement
 from .signals import ADVANCE, BIT_WORK, DEPTH, END_WORK, SIDE_FORCE, Signals, Window
 
@@ -29,11 +31,11 @@ def rough(friction: float) -> dict[str, Any]:
     return {"contact.friction_static": friction, "contact.friction_dynamic": friction}
 
 
-def sag(run: Signals) -> float:
+def sag(scene: Scene) -> float:
     """Length (m) of string between the clamp and the wall, (72 EI c_gap/w)^(1/4) (spec 10.5)."""
-    section, hole = run.scene.string[0], run.scene.hole.diameter
+    section, hole = scene.string[0], scene.hole.diameter
     assert hole is not None
-    weight = section.mass_per_length * run.scene.gravity.magnitude
+    weight = section.mass_per_length * scene.gravity.magnitude
     gap = hole / 2 - section.contact_radius
     return float((72 * section.section_stiffness().bending1 * gap / weight) ** 0.25)
 
@@ -85,7 +87,7 @@ def _part_touches(runs: Runs) -> tuple[bool | None, str]:
         return None, ""
     s, q = load
     first = float(s[q > 0].min())
-    return first > 1.0, f"from {first:.1f} m on; a beam that sags through the clearance: {sag(runs['A']):.1f} m"
+    return first > 1.0, f"from {first:.1f} m on; a beam that sags through the clearance: {sag(runs['A'].scene):.1f} m"
 
 
 def _side_force(name: str, formula: float) -> Claim:

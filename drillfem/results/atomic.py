@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from drillfem.errors import SceneError
+
 _serial = itertools.count()
 
 
@@ -40,6 +42,34 @@ def remove_leftovers(folder: Path) -> None:
         part.unlink(missing_ok=True)
 
 
+class Lock:
+    """Keeps other processes out of a folder until `release`; goes with this process, however that ends.
+
+    Raises SceneError where another one has it.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._descriptor: int | None = None
+        try:
+            import fcntl
+        except ImportError:  # Windows
+            return
+        self._descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self.release()
+            raise SceneError(f"{folder}: another process is writing to it") from None
+        except OSError:  # a file system without locks
+            pass
+
+    def release(self) -> None:
+        """Let others in."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+
+
 def plain(value: Any) -> Any:
     """``value`` in the types of JSON: numpy scalars and arrays unpacked, NaN and infinities as ``None``."""
     if isinstance(value, Mapping):
@@ -60,3 +90,16 @@ def write_json(path: Path, data: Mapping[str, Any]) -> None:
     text = json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False)
     with replacing(path) as part:
         part.write_text(text + "\n", encoding="utf-8")
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Table in a JSON file. Raises SceneError, with what is missing or wrong."""
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise SceneError(f"{path.parent}: is not a result folder, it has no {path.name}") from None
+    except (OSError, ValueError) as error:
+        raise SceneError(f"{path}: cannot be read ({error})") from error
+    if not isinstance(data, dict):
+        raise SceneError(f"{path}: cannot be read (a table was expected)")
+    return data

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +10,8 @@ from typing import Any
 import xarray as xr
 
 from drillfem.errors import SceneError
+
+from .atomic import read_json
 
 
 @dataclass
@@ -52,24 +53,12 @@ def open_result(folder: str | Path) -> Result:
     path = Path(folder)
     if not path.is_dir():
         raise SceneError(f"{folder}: there is no such folder")
-    manifest, summary = _json(path / "manifest.json"), _json(path / "summary.json")
+    manifest, summary = read_json(path / "manifest.json"), read_json(path / "summary.json")
     if not (path / "history.nc").exists():
         raise SceneError(f"{folder}: no history.nc, nothing was computed before this run stopped")
     history = _dataset(path / "history.nc")
     fields = path / "fields" / "fields.nc"
     return Result(history, summary, _dataset(fields) if fields.exists() else None, manifest, path)
-
-
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise SceneError(f"{path.parent}: is not a result folder, it has no {path.name}") from None
-    except (OSError, ValueError) as error:
-        raise SceneError(f"{path}: cannot be read ({error})") from error
-    if not isinstance(data, dict):
-        raise SceneError(f"{path}: cannot be read (a table was expected)")
-    return data
 
 
 def _dataset(path: Path) -> xr.Dataset:

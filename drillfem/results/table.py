@@ -14,10 +14,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from .atomic import write_json
+from .atomic import read_json, write_json
 from .history import STANDARD
 from .performance import nominal_performance, performance
-from .result import Result, _json
+from .result import Result
 from .spectra import dominant_in
 
 Statistics = dict[str, float | None]
@@ -232,7 +232,7 @@ def store_statistics(result: Result, companions: Mapping[str, Result] | None = N
     result.summary["statistics"] = stored | {name: statistics(other) for name, other in named.items()}
     if result.folder is not None:
         path = Path(result.folder) / "summary.json"
-        write_json(path, _json(path) | {"statistics": result.summary["statistics"]})
+        write_json(path, read_json(path) | {"statistics": result.summary["statistics"]})
 
 
 def _weights(time: NDArray[np.float64]) -> NDArray[np.float64]:

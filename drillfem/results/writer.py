@@ -15,12 +15,12 @@ from numpy.typing import ArrayLike
 
 from drillfem.errors import SceneError
 
-from .atomic import remove_leftovers, write_json
+from .atomic import Lock, read_json, remove_leftovers, write_json
 from .checkpoint import flatten, read_checkpoint, write_checkpoint
 from .fields import ALIASES, STATIC, field_variables, write_vtkhdf
 from .history import STANDARD, SeriesFile, Variable
 from .manifest import check_new_folder, new_manifest, this_run, versions
-from .result import Result, _dataset, _json
+from .result import Result, _dataset
 
 MAX_SHARE = 0.05
 """Share of the wall time that flushing may take: the intervals grow with what a flush costs."""
@@ -89,7 +89,7 @@ class ResultWriter:
         }
         self._earlier_wall = 0.0
         self._folder: Path | None = None
-        self._lock: int | None = None
+        self._lock: Lock | None = None
         self._fields: SeriesFile | None = None
         self._checkpoint: tuple[float, dict[str, np.ndarray]] | None = None
         self._finished = False
@@ -201,7 +201,7 @@ class ResultWriter:
         self.flush()
         self._finished = True
         self._unlock()
-        manifest = {} if self._folder is None else _json(self._folder / "manifest.json")
+        manifest = {} if self._folder is None else read_json(self._folder / "manifest.json")
         fields = None if self._fields is None else self._fields.dataset()
         return Result(self._history.dataset(), dict(self._summary), fields, manifest, self._folder, self._scene)
 
@@ -224,15 +224,15 @@ class ResultWriter:
             self._folder = Path(folder) if resume else check_new_folder(folder)
             if resume:
                 manifest, summary = (
-                    _json(self._folder / "manifest.json"),
-                    _json(self._folder / "summary.json"),
+                    read_json(self._folder / "manifest.json"),
+                    read_json(self._folder / "summary.json"),
                 )
                 manifest |= {"runs": [*manifest.get("runs", []), this_run()], "versions": versions()}
                 self._earlier_wall = float(summary.get("wall_seconds") or 0.0)
             else:
                 manifest = new_manifest(self._scene, self._summary["model"])
                 self._make(self._folder)
-            self._take_lock(self._folder)
+            self._lock = Lock(self._folder)
             remove_leftovers(self._folder)
             if resume:
                 self.restart = read_checkpoint(self._folder)
@@ -257,24 +257,9 @@ class ResultWriter:
         if not os.access(folder, os.W_OK):
             raise SceneError(f"{folder}: cannot be written to; choose another folder for the result")
 
-    def _take_lock(self, folder: Path) -> None:
-        """Keep a second run out of the folder. The lock goes with the process, however that ends."""
-        try:
-            import fcntl
-        except ImportError:  # Windows
-            return
-        self._lock = os.open(folder, os.O_RDONLY)
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise SceneError(f"{folder}: another process is writing to it") from None
-        except OSError:  # a file system without locks
-            pass
-
     def _unlock(self) -> None:
         if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+            self._lock.release()
 
     def _reopen_fields(self, time: float) -> None:
         assert self._folder is not None

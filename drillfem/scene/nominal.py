@@ -35,7 +35,7 @@ def nominal(scene: Scene, spin: float | None = None, weight: float | None = None
     drive, bit, rock = scene.top_drive, scene.bit, scene.rock
     weight = scene.hanging_weight if weight is None else weight
     speed = (drive.speed or 0.0) if spin is None else spin
-    if bit is None or bit.kind in ("free", "saturating") or (bit.kind == "cutting" and rock is None):
+    if bit is None or not scene.bites or (bit.kind == "cutting" and rock is None):
         return Nominal(0.0, 0.0, 0.0, weight if drive.hook_load is None else drive.hook_load, 0.0)
     load = drive.weight_on_bit
     if load is None and drive.hook_load is not None:

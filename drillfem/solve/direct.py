@@ -133,16 +133,13 @@ class DirectRun:
     def row(self, t: float) -> dict[str, float]:
         """History row of the present state."""
         rod, u = self.rod, self.stepper.u
-        out: dict[str, float] = {}
         torque, speed = rod.top_torque(t), rod.scene.top_drive.motion(t)[1]
         if rod.drive is not None:
             torque, speed = rod.drive.torque(), rod.drive.speed
         hook_load = rod.hook_load()
-        if rod.scene.motor is not None:
-            out = {"motor_force": float(rod.push.value)}
         rod.set_state(u, rod.u_dot.x.array)
         kinetic, strain = rod.energies()
-        out |= {
+        out = {
             "top_torque": torque,
             "top_angular_speed": speed,
             "hook_load": hook_load,
@@ -152,6 +149,8 @@ class DirectRun:
         }
         self._stored, self._works, self._row_time = kinetic + strain, self.audit.until(t), t
         out |= self._works
+        if rod.scene.motor is not None:
+            out["motor_force"] = float(rod.push.value)
         if rod.wall is not None:
             out |= rod.wall_row()
         if rod.turns:

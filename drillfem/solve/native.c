@@ -92,8 +92,8 @@ struct wall {
     int64_t n_cells, per_cell, n_points, n_knots, n_radius, n_friction, width;
     double *p, *data;
     double found[4];
-    double reach, retardation; /* distance from the wall within which it acts; time of approach that adds to it */
-    int32_t always, speed;     /* whether it acts everywhere; place of the velocity */
+    double reach, retardation; /* distance from the wall within which it acts (or all); time of approach that adds to it */
+    int32_t speed;             /* place of the velocity */
 };
 
 /* Newton's method for one stage of a step of a string without rock, as `BitCoupledNewton._iterate` states it. */
@@ -541,8 +541,6 @@ static int look(struct wall *w, int size, int block, const double *u)
 static int touches(const struct wall *w, int size, int block, const double *u)
 {
     double reach = w->reach;
-    if (w->always)
-        return 1;
     if (w->retardation != 0.0) {
         double fastest = 0.0;
         for (int i = 0; i < size; i += block)

@@ -328,9 +328,9 @@ class NativeNewton:
 
     def __init__(self, system: CompiledSystem, solver: NativeSolver, rod: Rod) -> None:
         native = library()
-        self._lib, self._rod = native.lib, rod
+        self._lib, self._rod, self._system = native.lib, rod, system
         ffi = native.ffi
-        self._keep: list[Any] = [system, solver]
+        self._keep: list[Any] = [solver]
 
         def pointer(array: Any, kind: str = "double *") -> Any:
             self._keep.append(array)
@@ -374,7 +374,6 @@ class NativeNewton:
         w.hole_radius, w.friction_at, w.friction = map(pointer, (table.radius, table.friction_at, table.friction))
         w.n_knots, w.n_radius, w.n_friction = len(table.knots), len(table.radius), len(table.friction)
         w.reach, w.retardation = rod.wall_reach, wall.retardation
-        w.always = contact.normal_force == "weight"
         return w
 
     def __call__(self, newton: BitCoupledNewton, a: float, b: float, rate: bool, known: bool) -> Outcome | None:
@@ -392,10 +391,6 @@ class NativeNewton:
         if wall is not None:
             wall.gap, wall.trouble = self._wall.found[0], ""
         if found == _OUTSIDE:
-            self._trusted_back()
+            self._system.x[:] = self._system.trusted
             return None
         return Outcome(found)
-
-    def _trusted_back(self) -> None:
-        system = self._keep[0]
-        system.x[:] = system.trusted

@@ -65,7 +65,7 @@ class System(Protocol):
         ...
 
     def iterate(self, newton: BitCoupledNewton) -> Outcome | None:
-        """All iterations of a rod without rock at once; None where the system cannot, and has changed nothing."""
+        """All iterations of a rod without rock at once; None where the system cannot, with an x to go on from."""
         ...
 
     def settle(self) -> None:
